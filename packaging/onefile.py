@@ -20,6 +20,10 @@ import sbom
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 PAGE = ROOT / "crates/moiregauge-serve/page"
 WITHIN = ROOT / "crates/moiregauge-browser/page"
+NEEDED = (
+    "Needed: Chromium, Chrome or Edge 103, Firefox 113, Safari 16.4, or a later one; on a PC a processor with SSE 4.1; "
+    "WebAssembly not switched off by a policy."
+)
 IMPORT = re.compile(r"""((?:^import\b[^"']*|^\} from |\bawait import\()\s*)["']\./([\w.]+)["']""", re.M)
 
 
@@ -98,7 +102,7 @@ def main(program, out, largest):
   <meta name="referrer" content="no-referrer">
   <title>moiregauge</title>
 </head>
-<body>{body}  <details id="licences"><summary>Licences</summary><pre tabindex="0" aria-label="Licences"></pre></details>
+<body><p id="opening">{NEEDED}</p>{body}  <details id="licences"><summary>Licences</summary><pre tabindex="0" aria-label="Licences"></pre></details>
 <script type="text/plain" id="page">{packed(json.dumps(page).encode())}</script>
 <script type="text/plain" id="program">{packed(pathlib.Path(program).read_bytes())}</script>
 <script>{boot}</script>

@@ -17,7 +17,18 @@
   };
   const unpacked = (/** @type {string} */ id) =>
     new Response(new Blob([packed(id)]).stream().pipeThrough(new DecompressionStream("gzip")));
+  // What is needed, in words, for browsers that do not understand this script, too.
+  const opening = /** @type {HTMLElement} */ (document.getElementById("opening"));
+  // A module with one instruction of SIMD: (i8x16.splat (i32.const 0)).
+  const simd = Uint8Array.of(0, 97, 115, 109, 1, 0, 0, 0, 1, 5, 1, 96, 0, 1, 123, 3, 2, 1, 0, 10, 8, 1, 6, 0, 65, 0, 253, 15, 11);
+  /** @type {[string, () => boolean][]} */
+  const needed = [
+    ["WebAssembly", () => typeof WebAssembly === "object"],
+    ["the SIMD instructions of WebAssembly", () => WebAssembly.validate(simd)],
+    ["DecompressionStream", () => typeof DecompressionStream === "function"],
+  ];
   try {
+    for (const [what, has] of needed) if (!has()) throw new Error(`it lacks ${what}`);
     const { styles, modules, licences, icon } = await (await unpacked("page")).json();
     document.head.append(Object.assign(document.createElement("style"), { textContent: styles }));
     document.head.append(Object.assign(document.createElement("link"), { rel: "icon", href: `data:image/svg+xml,${encodeURIComponent(icon)}` }));
@@ -32,10 +43,12 @@
     const program = await WebAssembly.compile(await (await unpacked("program")).arrayBuffer());
     Object.assign(globalThis, { moiregaugeWithin: new Within(program, places["worker.js"]) });
     for (const id of ["page", "program"]) document.getElementById(id)?.remove();
+    opening.remove();
     const panel = /** @type {HTMLElement} */ (document.getElementById("licences"));
     panel.querySelector("pre")?.append(licences);
     await import(places["main.js"]);
   } catch (error) {
-    document.body.append(`This browser cannot open the page: ${error}. It needs WebAssembly with SIMD and DecompressionStream.`);
+    opening.setAttribute("role", "alert");
+    opening.prepend(`This browser cannot open moiregauge: ${/** @type {Error} */ (error).message}. `);
   }
 })();

@@ -1,6 +1,6 @@
 // Files in memory, as WASI preview 1 gives them to the program. Files that the user dropped are read in pieces.
 
-const [BADF, EXIST, INVAL, ISDIR, NOENT, NOSYS, NOTDIR, NOTEMPTY] = [8, 20, 28, 31, 44, 52, 54, 55];
+const [BADF, EXIST, INVAL, IO, ISDIR, NOENT, NOSYS, NOTDIR, NOTEMPTY] = [8, 20, 28, 29, 31, 44, 52, 54, 55];
 const [DEVICE, FOLDER, FILE] = [2, 3, 4];
 const [CREATE, DIRECTORY, EXCLUSIVE, TRUNCATE] = [1, 2, 4, 8];
 /** Bytes that are read of a dropped file at a time. */
@@ -76,9 +76,7 @@ export class Dropped {
     const { piece } = this;
     if (at < piece.at || at + length > piece.at + piece.bytes.length) {
       const end = Math.min(this.size, at + Math.max(length, PIECE));
-      // Workers have it; types are those of pages.
-      const bytes = new /** @type {any} */ (globalThis).FileReaderSync().readAsArrayBuffer(this.blob.slice(at, end));
-      this.piece = { at, bytes: new Uint8Array(bytes) };
+      this.piece = { at, bytes: fromDisk(this.blob.slice(at, end)) };
     }
     const from = at - this.piece.at;
     into.set(this.piece.bytes.subarray(from, from + length));
@@ -88,16 +86,17 @@ export class Dropped {
   }
 }
 
-/** @typedef {{node: Folder | Held | Dropped, at: number, append: boolean, path: string}} Open */
+/** @typedef {{node: Folder | Held | Dropped, at: number, append: boolean, path: string, written: boolean}} Open */
 
 /** All files, and the calls of WASI on them. */
 export class Files {
-  /** @param {{line: (text: string) => void, changed: (path: string) => void}} hears lines of the standard output, and paths */
+  /** @param {{line: (text: string) => void, changed: (path: string) => void}} hears lines of the standard output, and paths of
+   * what was written or went, as soon as it is whole */
   constructor(hears) {
     this.hears = hears;
     this.root = new Folder();
     /** @type {Map<number, Open>} */
-    this.open = new Map([[3, { node: this.root, at: 0, append: false, path: "" }]]);
+    this.open = new Map([[3, { node: this.root, at: 0, append: false, path: "", written: false }]]);
     this.next = 4;
     /** @type {Record<number, string>} */
     this.printed = { 1: "", 2: "" };
@@ -135,6 +134,12 @@ export class Files {
     }
     if (name !== "") folder.inside.set(name, node);
     return folder;
+  }
+
+  /** Takes something away that may have gone already. @param {string} path */
+  take(path) {
+    const { folder, name } = this.place(path);
+    folder?.inside.delete(name);
   }
 
   /** @param {string} path */
@@ -198,10 +203,15 @@ export class Files {
     if (!file) return BADF;
     if (file.node instanceof Folder) return ISDIR;
     let [place, total] = [at ?? file.at, 0];
-    for (const piece of this.pieces(iovs, count)) {
-      const read = file.node.read(place, piece);
-      [place, total] = [place + read, total + read];
-      if (read < piece.length) break;
+    try {
+      for (const piece of this.pieces(iovs, count)) {
+        const read = file.node.read(place, piece);
+        [place, total] = [place + read, total + read];
+        if (read < piece.length) break;
+      }
+    } catch {
+      // Written anew or gone since it was dropped.
+      return IO;
     }
     if (at === null) file.at = place;
     this.view().setUint32(out, total, true);
@@ -228,7 +238,7 @@ export class Files {
         place += piece.length;
       }
       if (at === null) file.at = place;
-      this.hears.changed(file.path);
+      file.written = true;
     }
     this.view().setUint32(out, total, true);
     return 0;
@@ -261,7 +271,11 @@ export class Files {
       proc_exit: (/** @type {number} */ code) => {
         throw new Error(`the program ended with ${code}`);
       },
-      fd_close: (/** @type {number} */ fd) => (this.open.delete(fd) ? 0 : BADF),
+      fd_close: (/** @type {number} */ fd) => of(fd, (file) => {
+        this.open.delete(fd);
+        if (file.written) this.hears.changed(file.path);
+        return 0;
+      }),
       fd_prestat_get: (/** @type {number} */ fd, /** @type {number} */ out) => {
         if (fd !== 3) return BADF;
         this.view().setUint32(out, 0, true);
@@ -281,9 +295,11 @@ export class Files {
         return 0;
       },
       fd_filestat_get: (/** @type {number} */ fd, /** @type {number} */ out) => of(fd, (file) => this.stat(out, file.node)),
-      fd_filestat_set_size: (/** @type {number} */ fd, /** @type {bigint} */ size) => of(fd, ({ node }) => {
+      fd_filestat_set_size: (/** @type {number} */ fd, /** @type {bigint} */ size) => of(fd, (file) => {
+        const { node } = file;
         if (!(node instanceof Held)) return INVAL;
         node.cut(Number(size));
+        file.written = true;
         return 0;
       }),
       fd_seek: (/** @type {number} */ fd, /** @type {bigint} */ offset, /** @type {number} */ from, /** @type {number} */ out) => of(fd, (file) => {
@@ -326,8 +342,10 @@ export class Files {
         if (!node || !there.folder) return NOENT;
         here.folder?.inside.delete(here.name);
         there.folder.inside.set(there.name, node);
-        this.hears.changed(from);
-        this.hears.changed(into);
+        for (const below of filesIn(node)) {
+          this.hears.changed(from + below);
+          this.hears.changed(into + below);
+        }
         return 0;
       },
       path_unlink_file: (/** @type {number} */ fd, /** @type {number} */ at, /** @type {number} */ length) => this.removed(this.path(fd, at, length), false),
@@ -345,22 +363,22 @@ export class Files {
 
   /** @param {string} path @param {number} how @param {number} flags @param {number} out */
   opened(path, how, flags, out) {
-    let node = this.find(path);
+    let [node, written] = [this.find(path), false];
     if (node && how & EXCLUSIVE) return EXIST;
     if (!node) {
       const { folder, name } = this.place(path);
       if (!(how & CREATE) || !folder) return NOENT;
       folder.inside.set(name, (node = new Held()));
-      this.hears.changed(path);
+      written = true;
     }
     if (how & DIRECTORY && !(node instanceof Folder)) return NOTDIR;
     if (how & TRUNCATE && !(node instanceof Folder)) {
       node = new Held();
       this.put(path, node);
-      this.hears.changed(path);
+      written = true;
     }
     const fd = this.next++;
-    this.open.set(fd, { node, at: 0, append: (flags & 1) === 1, path });
+    this.open.set(fd, { node, at: 0, append: (flags & 1) === 1, path, written });
     this.view().setUint32(out, fd, true);
     return 0;
   }
@@ -398,6 +416,18 @@ export class Files {
     }
     return all;
   }
+}
+
+/** The places of all files in something, as seen from it; of a file that of itself. @param {Folder | Held | Dropped} node @returns {string[]} */
+function filesIn(node) {
+  if (!(node instanceof Folder)) return [""];
+  return [...node.inside].flatMap(([name, inside]) => filesIn(inside).map((below) => `/${name}${below}`));
+}
+
+/** Bytes of a file of the user. @param {Blob} part */
+function fromDisk(part) {
+  // Workers have it; types are those of pages.
+  return new Uint8Array(new /** @type {any} */ (globalThis).FileReaderSync().readAsArrayBuffer(part));
 }
 
 /** The names in a path, without those that lead nowhere. @param {string} path */

@@ -6,11 +6,10 @@ import { Dropped, Files, Held } from "./wasi.js";
 let files;
 /** @type {any} */
 let program;
-/** Files that changed and that the page keeps, for the next worker. @type {Set<string>} */
-const changed = new Set();
 /** @type {any[]} */
 const waiting = [];
-let planned = false;
+/** The next step. @type {ReturnType<typeof setTimeout> | undefined} */
+let planned;
 
 /** Whether the page keeps a file: works, and scans that were simulated here. @param {string} path */
 const isKept = (path) => path.startsWith("kept/") || path.startsWith("dropped/");
@@ -22,7 +21,7 @@ async function begin({ module, held }) {
       const [kind, value] = JSON.parse(text);
       postMessage({ event: kind, value });
     },
-    changed: (path) => isKept(path) && changed.add(path),
+    changed: (path) => isKept(path) && tell(path),
   });
   for (const folder of ["ask", "dropped", "kept", "tmp"]) files.folder(folder);
   for (const [path, what] of held) put(path, what);
@@ -30,21 +29,21 @@ async function begin({ module, held }) {
   program = (await WebAssembly.instantiate(module, { wasi_snapshot_preview1: wasi })).exports;
   files.memory = program.memory;
   program._initialize?.();
-  postMessage({ ready: true });
+  after(0);
 }
 
-/** @param {string} path @param {File} what */
+/** @param {string} path @param {File | null} what */
 function put(path, what) {
-  files.put(path, new Dropped(what));
+  if (what) files.put(path, new Dropped(what));
+  else files.take(path);
 }
 
-/** Tells the page which files changed. */
-function tell() {
-  for (const path of changed) {
-    const node = files.find(path);
-    postMessage({ kept: path, file: node instanceof Held ? new File([node.whole()], "", { lastModified: node.time }) : null });
-  }
-  changed.clear();
+/** Gives the page a file for the next worker, or tells it that there is none: at once, since this worker may be ended at any time.
+ * @param {string} path */
+function tell(path) {
+  const node = files.find(path);
+  if (node instanceof Held) postMessage({ kept: path, file: new File([node.whole()], "", { lastModified: node.time }) });
+  else if (!node) postMessage({ kept: path, file: null });
 }
 
 /** @param {{id: number, method: string, path: string, body: string}} asked */
@@ -63,35 +62,36 @@ function answer({ id, method, path, body }) {
 
 /** Does one thing, requests before work that takes its time; what came meanwhile has its turn in between. */
 function step() {
-  planned = false;
   const next = waiting.shift();
-  let more = true;
+  let rest = 0;
   try {
     if (next) answer(next);
     else {
       postMessage({ working: true });
-      more = program.turn() === 1;
+      rest = program.turn();
       postMessage({ working: false });
     }
-    tell();
   } catch (error) {
     // It is as it was left: another worker begins anew.
     postMessage({ broken: files.complaint.trim() || String(error), id: next?.id });
     return;
   }
-  if (more) soon();
+  if (rest >= 0) after(rest);
 }
 
-function soon() {
-  if (!planned) setTimeout(step, 0);
-  planned = true;
+/** @param {number} rest milliseconds without work, unless somebody asks */
+function after(rest) {
+  if (!program) return;
+  clearTimeout(planned);
+  planned = setTimeout(step, waiting.length > 0 ? 0 : rest);
 }
 
 addEventListener("message", ({ data }) => {
   if (data.module) begin(data).catch((error) => postMessage({ broken: String(error) }));
   else if (data.put) put(data.put, data.what);
+  else if (data.tick) setInterval(() => postMessage({ tick: true }), data.tick);
   else {
     waiting.push(data);
-    soon();
+    after(0);
   }
 });

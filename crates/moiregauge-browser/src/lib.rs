@@ -39,11 +39,12 @@ pub extern "C" fn answer() -> i32 {
     }
 }
 
-/// Does what was begun and waits longest; 1: there was something.
+/// Does what was begun and waits longest; how many milliseconds there is nothing to do then, -1: for ever.
 #[expect(unsafe_code, reason = "the page finds the function by its name")]
 #[unsafe(no_mangle)]
 pub extern "C" fn turn() -> i32 {
-    with(|routes| Ok(routes.turn())).is_ok_and(|did| did).into()
+    let rest = with(|routes| Ok(routes.turn())).ok().flatten();
+    rest.map_or(-1, |rest| rest.as_millis().try_into().unwrap_or(i32::MAX))
 }
 
 fn with<T>(what: impl FnOnce(&Alone) -> Result<T, Failed>) -> Result<T, Failed> {

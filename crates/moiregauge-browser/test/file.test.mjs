@@ -4,10 +4,11 @@ import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
-import { join } from "node:path";
+import { basename, join } from "node:path";
 import { pathToFileURL } from "node:url";
 import { after, test } from "node:test";
-import { PROGRAM, WORK, closeBrowser, nextResult, open, scansOf, simulated, view } from "./harness.mjs";
+import { byProgram, same } from "./compare.mjs";
+import { WORK, campaign, closeBrowser, nextResult, open, scansOf, simulated, theBrowser, view } from "./harness.mjs";
 
 const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 const FILE = pathToFileURL(process.env.HTML ?? "").href;
@@ -34,6 +35,15 @@ async function drop(page, files) {
   await page.getByText(`${files.length} of ${files.length} files taken`).waitFor({ timeout: 60000 });
 }
 
+/** Files and folders, dropped as from a window of the system. @param {Page} page @param {string[]} files */
+async function dragged(page, files) {
+  await view(page, "Look");
+  const browser = await page.context().newCDPSession(page);
+  const data = { items: [], files, dragOperationsMask: 1 };
+  for (const type of /** @type {const} */ (["dragEnter", "dragOver", "drop"])) await browser.send("Input.dispatchDragEvent", { type, x: 300, y: 300, data });
+  await page.getByText(/^(\d+) of \1 files taken/).waitFor({ timeout: 60000 });
+}
+
 /** @param {Page} page */
 async function analyse(page) {
   await view(page, "Analyse");
@@ -46,35 +56,10 @@ async function results(page) {
   return answer(page, `works/${works.at(-1)}/results.json`);
 }
 
-/** What the program writes. @param {string[]} files @param {string} name */
-function byProgram(files, name) {
-  const out = join(WORK, `by-program-${name}`);
-  execFileSync(PROGRAM, ["analyze", ...files, "--out", out, "--force", "--quiet", "--no-png"], { stdio: ["ignore", "ignore", "inherit"] });
-  return JSON.parse(readFileSync(join(out, "results.json"), "utf8"));
-}
-
-/** Every uncertain value with its place in the document. @param {any} document @param {string} at @returns {[string, number, number][]} */
-function uncertain(document, at = "") {
-  if (document === null || typeof document !== "object") return [];
-  const own = /** @type {[string, number, number][]} */ (typeof document.value === "number" && typeof document.sigma === "number" ? [[at, document.value, document.sigma]] : []);
-  return [...own, ...Object.entries(document).flatMap(([key, inside]) => uncertain(inside, `${at}/${key}`))];
-}
-
-/** The same values, within 1e-9 of their errors. @param {any} here @param {any} there */
-function same(here, there) {
-  const [mine, theirs] = [uncertain(here.sets), uncertain(there.sets)];
-  assert.deepEqual(mine.map(([at]) => at), theirs.map(([at]) => at));
-  assert.ok(mine.length > 10);
-  const off = mine.map(([, value, sigma], i) => Math.max(Math.abs(value - theirs[i][1]), Math.abs(sigma - theirs[i][2])) / (theirs[i][2] || 1));
-  const most = Math.max(...off);
-  console.log(`${mine.length} values, the most different by ${most.toExponential(1)} of its error`);
-  assert.ok(most < 1e-9, mine[off.indexOf(most)][0]);
-}
-
 test("scans that are dropped give the program's numbers", async () => {
   const page = await opened();
   const files = scansOf(simulated("plain"));
-  await drop(page, files);
+  await dragged(page, files);
   await analyse(page);
   same(await results(page), byProgram(files, "plain"));
   assert.match((await results(page)).provenance.version, /browser$/);
@@ -163,21 +148,144 @@ test("a map, a correction by hand, a zip; axe-core finds nothing serious", async
   await page.leave();
 });
 
-test("what runs can be stopped, and begun again with what was there", async () => {
+test("what runs can be stopped, and what was measured is not measured again", async () => {
   const page = await opened();
   await drop(page, scansOf(simulated("plain")));
   await analyse(page);
   const before = await results(page);
-  await drop(page, scansOf(simulated("long", ["--scans", "8", "--pixels", "512"])));
+  const files = scansOf(simulated("long", ["--scans", "6", "--pixels", "512"]));
+  await view(page, "Look");
+  await page.getByRole("button", { name: "Choose none" }).click();
+  await drop(page, files);
+  // Scans that were kept each for itself, as soon as they were measured.
+  await page.evaluate(() => {
+    const { keep } = /** @type {any} */ (globalThis).moiregaugeWithin;
+    const kept = (/** @type {any} */ (globalThis).keptScans = []);
+    /** @type {any} */ (globalThis).moiregaugeWithin.keep = function (/** @type {any[]} */ ...of) {
+      if (of[2] && /begun-/.test(of[1])) kept.push(of[1]);
+      keep.apply(this, of);
+    };
+  });
+  const measured = () => page.evaluate(() => /** @type {string[]} */ (/** @type {any} */ (globalThis).keptScans));
   await view(page, "Analyse");
   await page.getByRole("button", { name: /^Analyse/ }).click();
-  await page.getByRole("button", { name: "Cancel" }).waitFor();
-  await page.waitForTimeout(500);
-  const asked = Date.now();
-  await page.getByRole("button", { name: "Cancel" }).click();
-  await page.getByRole("button", { name: /^Analyse/ }).waitFor();
-  console.log(`stopped after ${Date.now() - asked} ms`);
+  await page.waitForFunction(() => /** @type {any} */ (globalThis).keptScans.length >= 2, null, { timeout: 120000 });
+  const took = await page.evaluate(async () => {
+    const begun = performance.now();
+    const cancel = /** @type {HTMLElement} */ ([...document.querySelectorAll("#view-analyse button")].find((b) => b.textContent === "Cancel"));
+    cancel.click();
+    const again = /** @type {HTMLButtonElement} */ (document.querySelector("#view-analyse button.main"));
+    while (again.disabled) await new Promise((next) => setTimeout(next, 5));
+    return performance.now() - begun;
+  });
+  console.log(`stopped after ${Math.round(took)} ms`);
+  const first = (await measured()).length;
   const { works } = await answer(page, "state");
   assert.deepEqual((await answer(page, `works/${works[0]}/results.json`)).sets, before.sets);
+  await nextResult(page, () => page.getByRole("button", { name: /^Analyse/ }).click());
+  const all = await measured();
+  assert.equal(new Set(all).size, files.length);
+  assert.equal(all.length, files.length, `${first} scans were measured before`);
+  same(await results(page), byProgram(files, "long"));
   await page.leave();
+});
+
+test("a campaign over a dropped folder gives the program's table", async () => {
+  const page = await opened();
+  const [table, samples] = [join(campaign(), "samples.csv"), join(WORK, "samples")];
+  await dragged(page, [samples]);
+  await view(page, "Samples");
+  const folder = page.getByLabel("Folder of results");
+  await page.waitForFunction(() => [...document.querySelectorAll("#view-samples option")].some((o) => o.textContent?.endsWith(" / samples")));
+  const label = (await folder.locator("option").allTextContents()).find((text) => text.endsWith(" / samples"));
+  await folder.selectOption({ label });
+  await page.getByRole("button", { name: "Analyse the samples in it" }).click();
+  await page.locator("#view-samples tbody tr").nth(2).waitFor({ timeout: 120000 });
+  const [zip] = await Promise.all([page.waitForEvent("download"), page.getByRole("link", { name: "Table and page as zip" }).click()]);
+  const [packed, into] = [join(WORK, "campaign.zip"), join(WORK, "campaign-from-zip")];
+  await zip.saveAs(packed);
+  execFileSync("python3", ["-m", "zipfile", "-e", packed, into]);
+  sameTables(readFileSync(join(into, "samples.csv"), "utf8"), readFileSync(table, "utf8"));
+  assert.ok(readFileSync(join(into, "campaign.html"), "utf8").includes("second"));
+  assert.deepEqual([page.wrong, page.asked], [[], []]);
+  await page.leave();
+});
+
+/** The same table: words are the same, numbers to nine digits. @param {string} here @param {string} there */
+function sameTables(here, there) {
+  const [mine, theirs] = [here, there].map((text) => text.trim().split("\n").map((line) => line.split(",")));
+  assert.equal(mine.length, 4);
+  assert.deepEqual(mine.map((line) => line.length), theirs.map((line) => line.length));
+  for (const [i, line] of mine.entries()) {
+    for (const [k, field] of line.entries()) {
+      const [a, b] = [Number(field), Number(theirs[i][k])];
+      assert.ok(field === theirs[i][k] || Math.abs(a - b) <= 1e-9 * Math.abs(b), `${mine[0][k]}: ${field}, ${theirs[i][k]}`);
+    }
+  }
+}
+
+test("a folder that is held open is watched", async () => {
+  const page = await opened();
+  const scans = scansOf(simulated("plain"));
+  // A window of the system cannot be clicked on: a folder of the page stands for the one that is chosen there.
+  const put = (/** @type {string} */ from, /** @type {number} */ share) => page.evaluate(([name, bytes, part]) => {
+    const all = Uint8Array.from(atob(/** @type {string} */ (bytes)), (c) => c.charCodeAt(0));
+    /** @type {any} */ (globalThis).onDisk.set(name, new File([all.subarray(0, all.length * Number(part))], String(name), { lastModified: Date.now() }));
+  }, [basename(from), readFileSync(from).toString("base64"), share]);
+  await page.evaluate(() => {
+    const files = new Map();
+    const entries = async function* () {
+      for (const [name, file] of files) yield [name, { kind: "file", getFile: async () => file }];
+    };
+    Object.assign(globalThis, { onDisk: files, showDirectoryPicker: async () => ({ name: "live", entries }) });
+  });
+  await put(scans[0], 1);
+  await view(page, "Watch");
+  await page.getByRole("button", { name: "Open a folder…" }).click();
+  await page.waitForFunction(() => document.querySelector("#view-watch select")?.textContent?.includes("live"));
+  await page.getByRole("button", { name: "Watch", exact: true }).click();
+  const frames = (/** @type {number} */ n) => page.waitForFunction((k) => Number(document.documentElement.dataset.watched ?? 0) === k, n, { timeout: 60000 });
+  await frames(1);
+  await put(scans[1], 0.5);
+  await page.waitForTimeout(6000);
+  await frames(1);
+  await put(scans[1], 1);
+  await frames(2);
+  // An analysis goes on beside it, and its cancel does not end it.
+  await drop(page, scansOf(simulated("long", ["--scans", "6", "--pixels", "512"])));
+  await view(page, "Analyse");
+  await page.getByRole("button", { name: /^Analyse/ }).click();
+  await page.getByRole("button", { name: "Cancel" }).click();
+  await put(scans[2], 1);
+  await frames(3);
+  await page.evaluate((name) => /** @type {any} */ (globalThis).onDisk.delete(name), basename(scans[2]));
+  await frames(2);
+  await view(page, "Watch");
+  await page.getByRole("button", { name: "Stop", exact: true }).click();
+  await page.getByText("Ended.").waitFor();
+  assert.deepEqual([page.wrong, page.asked], [[], []]);
+  await page.leave();
+});
+
+test("the command says what was told of files", async () => {
+  const page = await opened();
+  await drop(page, scansOf(simulated("plain")));
+  await page.getByText("4 scans chosen").waitFor();
+  const files = await page.locator("input[data-file]").evaluateAll((all) => all.map((one) => /** @type {HTMLElement} */ (one).dataset.file));
+  const asked = { method: "POST", body: JSON.stringify({ files, known: { size_nm: [70, 35], line_rate_hz: 5, frame_direction: "up" } }) };
+  const work = await page.evaluate(async (init) => (await (await /** @type {any} */ (globalThis).moiregaugeWithin.ask("works", init)).json()).work, asked);
+  assert.match((await answer(page, `works/${work}/command`)).command, /--size 70nm×35nm --line-rate 5 --frame-direction up --out results$/);
+  await page.leave();
+});
+
+test("a browser without what is needed is told so", async () => {
+  const whole = { executablePath: process.env.CHROMIUM };
+  for (const [flag, lacks] of [["--no-enable-sse4-1", "it lacks the SIMD instructions of WebAssembly"], ["--jitless", "it lacks WebAssembly"]]) {
+    const browser = await (await theBrowser()).browserType().launch({ ...whole, args: ["--no-sandbox", `--js-flags=${flag}`] });
+    const page = await browser.newPage();
+    await page.goto(FILE);
+    const words = await page.getByRole("alert").filter({ hasText: "cannot open" }).innerText();
+    assert.ok(words.startsWith(`This browser cannot open moiregauge: ${lacks}. Needed: Chromium, Chrome or Edge 103, Firefox 113`), words);
+    await browser.close();
+  }
 });

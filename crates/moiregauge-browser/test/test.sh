@@ -2,8 +2,8 @@
 # Tests of the one HTML file, opened from the disk in a real browser: test.sh FILE.html PROGRAM [FILTER]
 #
 # PROGRAM is moiregauge, whose numbers those of the file are compared with; SETS names folders of recorded scans, divided by ":".
-# The rest is as in ../../moiregauge-serve/browser/test.sh, but for Firefox: its driver evaluates text, which the content policy of the
-# file forbids. Ends with 77 where something is missing that is no part of the project.
+# The rest is as in ../../moiregauge-serve/browser/test.sh. Where there is Debian's Firefox ($FIREFOX), the file is tried in it, too.
+# Ends with 77 where something is missing that is no part of the project.
 set -eu
 [ $# -ge 2 ] || { echo "usage: test.sh FILE.html PROGRAM [FILTER]" >&2; exit 2; }
 HTML=$(realpath "$1") PROGRAM=$(realpath "$2")
@@ -28,5 +28,11 @@ fi
 mkdir -p "$WORK/tests"
 cp "$here"/*.mjs "$page/harness.mjs" "$WORK/tests/"
 ln -s "$modules/node_modules" "$WORK/tests/node_modules"
+firefox=${FIREFOX:-$(command -v firefox-esr || true)}
+unset FIREFOX
 export HTML PROGRAM CHROMIUM WORK
-node --test --test-concurrency=1 --test-timeout=400000 ${3:+--test-name-pattern="$3"} "$WORK"/tests/*.test.mjs
+if [ -z "$firefox" ]; then
+  echo "# firefox-esr is missing: the HTML file is tried in Chromium only"
+  rm "$WORK/tests/firefox.test.mjs"
+fi
+FIREFOX_ESR=$firefox node --test --test-concurrency=1 --test-timeout=400000 ${3:+--test-name-pattern="$3"} "$WORK"/tests/*.test.mjs

@@ -101,38 +101,6 @@ impl KnownArgs {
     }
 }
 
-/// The options that tell what is told.
-pub(crate) fn told_as_options(told: &UserSpecified) -> Vec<String> {
-    let frame = told.frame_direction.map(|order| {
-        let name = match order {
-            FrameOrder::Up => "up",
-            FrameOrder::Down => "down",
-            FrameOrder::AlternatingUp => "alternating-up",
-            FrameOrder::AlternatingDown => "alternating-down",
-        };
-        name.to_owned()
-    });
-    let block = |c: Crop| format!("{},{},{},{}", c.column, c.top, c.columns, c.rows);
-    let all = [
-        ("--size", told.size_nm.map(|[w, h]| format!("{w}nm×{h}nm"))),
-        ("--unit", told.unit.clone()),
-        ("--line-rate", told.line_rate_hz.map(|hz| hz.to_string())),
-        ("--frame-direction", frame),
-        ("--rotation", told.rotation_deg.map(|deg| deg.to_string())),
-        ("--x-sensor", told.x_sensor.clone()),
-        ("--y-sensor", told.y_sensor.clone()),
-        ("--sensor-unit", told.sensor_unit.clone()),
-        ("--sensors", told.sensors.clone()),
-        ("--crop", told.crop.map(block)),
-    ];
-    let given = all
-        .into_iter()
-        .filter_map(|(option, value)| Some((option, value?)));
-    given
-        .flat_map(|(option, value)| [option.to_owned(), value])
-        .collect()
-}
-
 /// The error with the option that it is about.
 pub(crate) fn with_option(error: KnownError) -> anyhow::Error {
     crate::errors::with_advice(error.into())
@@ -200,6 +168,7 @@ mod tests {
     #[test]
     fn what_is_told_becomes_options_and_is_told_again() {
         use clap::Parser as _;
+        use moiregauge_serve::told_as_options;
         #[derive(clap::Parser)]
         struct Typed {
             #[command(flatten)]

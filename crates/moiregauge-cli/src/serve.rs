@@ -5,11 +5,9 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use moiregauge_pipeline::Job;
-use moiregauge_serve::{Options, ServeError, Words};
+use moiregauge_serve::{Options, ServeError};
 
 use crate::errors::advice;
-use crate::input::told_as_options;
-use crate::map::as_options as map_as_options;
 use crate::say::say;
 
 /// Open a page to look at scans, analyse them, correct by hand and map
@@ -53,15 +51,6 @@ pub(crate) struct ServeArgs {
     token_file: Option<PathBuf>,
 }
 
-/// The options of the program, for the page.
-pub(crate) fn words() -> Words {
-    Words {
-        advice,
-        told: told_as_options,
-        map: map_as_options,
-    }
-}
-
 /// Answers until Ctrl-C.
 pub(crate) fn run(args: &ServeArgs, job: &Job) -> anyhow::Result<ExitCode> {
     let options = Options {
@@ -72,7 +61,7 @@ pub(crate) fn run(args: &ServeArgs, job: &Job) -> anyhow::Result<ExitCode> {
         page: args.page.clone(),
         keep: args.keep.clone(),
         browser: !args.no_browser,
-        words: words(),
+        advice,
         ..Options::default()
     };
     let mut told = Ok(());

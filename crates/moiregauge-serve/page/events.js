@@ -14,7 +14,7 @@ let retry;
 let waits = 500;
 
 /**
- * Calls back for events of a kind: "work", "map", "watch".
+ * Calls back for events of a kind: "work", "map", "watch", "campaign".
  * @param {string} kind
  * @param {(event: Happening) => void} callback
  */
@@ -59,7 +59,7 @@ export function listen() {
     tell(false);
     tell(true);
   });
-  for (const kind of ["work", "map", "watch"]) {
+  for (const kind of ["work", "map", "watch", "campaign"]) {
     stream.addEventListener(kind, (event) => {
       const said = JSON.parse(/** @type {MessageEvent} */ (event).data);
       const detail = { ...said, kind, id: said[kind] ?? said.id };

@@ -15,12 +15,17 @@ export class FileTree {
     this.list = h("ul", { class: "tree", "aria-label": "Folders and files" });
     this.note = h("p", { class: "hint", role: "status" });
     this.count = h("p", { class: "chosen-count" });
-    const picker = h("input", { type: "file", multiple: true, class: "away", id: "pick-files", tabindex: -1, "aria-label": "Files to open" });
-    picker.addEventListener("change", () => this.upload([...(picker.files ?? [])].map((file) => ({ file, name: file.name }))));
+    const pick = (/** @type {string} */ id, /** @type {string} */ label, /** @type {boolean} */ folder) => {
+      const picker = h("input", { type: "file", multiple: true, webkitdirectory: folder, class: "away", id, tabindex: -1, "aria-label": label });
+      picker.addEventListener("change", () => this.upload([...(picker.files ?? [])].map((file) => ({ file, name: file.webkitRelativePath || file.name }))));
+      return picker;
+    };
+    const [picker, folders] = [pick("pick-files", "Files to open", false), pick("pick-folder", "Folder to open", true)];
     this.drop = h("div", { class: "drop" },
       h("p", {}, "Drop files or folders here"),
       h("button", { type: "button", text: "Choose files…", onclick: () => picker.click() }),
-      h("button", { type: "button", class: "link", text: "Try it with simulated scans", onclick: () => this.tryIt() }), picker);
+      h("button", { type: "button", text: "Choose a folder…", onclick: () => folders.click() }),
+      h("button", { type: "button", class: "link", text: "Try it with simulated scans", onclick: () => this.tryIt() }), picker, folders);
     this.element = h("section", { class: "files", "aria-label": "Files" }, this.drop, this.note, this.list, this.count);
     this.listenToDrops();
     store.addEventListener("chosen", () => this.showChosen());
@@ -198,17 +203,37 @@ function unreadable(entry) {
 }
 
 /**
- * The files of a drop, those in folders with their places in them.
+ * The files of a drop, those in folders with their places in them. Chromium reads folders by handles, and not by entries where the
+ * page was opened from a disk; other browsers know entries only.
  * @param {DataTransfer} transfer
  * @returns {Promise<{file: File, name: string}[]>}
  */
 async function filesOf(transfer) {
-  const entries = [...transfer.items].map((item) => item.webkitGetAsEntry?.()).filter((e) => !!e);
-  if (entries.length === 0) return [...transfer.files].map((file) => ({ file, name: file.name }));
+  // All has to be asked for before the event is over.
+  const items = [...transfer.items].filter((item) => item.kind === "file").map((item) => {
+    const entry = item.webkitGetAsEntry?.();
+    return { entry, file: item.getAsFile(), handle: entry?.isDirectory ? /** @type {any} */ (item).getAsFileSystemHandle?.() : null };
+  });
   /** @type {{file: File, name: string}[]} */
   const found = [];
-  for (const entry of entries) await walk(/** @type {FileSystemEntry} */ (entry), "", found);
+  for (const { entry, file, handle } of items) {
+    if (handle) await walkHandle(await handle, entry?.name ?? "", found);
+    else if (entry?.isDirectory) await walk(entry, "", found);
+    else if (file) found.push({ file, name: file.name });
+  }
   return found.sort((a, b) => a.name.localeCompare(b.name, "en", { numeric: true }));
+}
+
+/**
+ * @param {any} folder
+ * @param {string} under
+ * @param {{file: File, name: string}[]} found
+ */
+async function walkHandle(folder, under, found) {
+  for await (const [name, inside] of folder.entries()) {
+    if (inside.kind === "directory") await walkHandle(inside, `${under}/${name}`, found);
+    else found.push({ file: await inside.getFile(), name: `${under}/${name}` });
+  }
 }
 
 /**

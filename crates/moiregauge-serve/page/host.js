@@ -3,7 +3,8 @@
 import { download } from "./dom.js";
 
 /** The program in the file, put there before any module begins.
- * @type {{ask: (path: string, init: RequestInit) => Promise<Response>, happenings: () => EventSource} | undefined} */
+ * @type {{ask: (path: string, init: RequestInit) => Promise<Response>, happenings: () => EventSource,
+ *   holdFolder: () => Promise<{root: string, under: string, name: string}>} | undefined} */
 const within = /** @type {any} */ (globalThis).moiregaugeWithin;
 
 /** Whether the program is in the same file. */
@@ -12,6 +13,15 @@ export const IN_ONE_FILE = within !== undefined;
 /** @param {string} path below /api/ @param {RequestInit} init @returns {Promise<Response>} */
 export function reach(path, init) {
   return within ? within.ask(path, init) : fetch(`/api/${path}`, { credentials: "same-origin", cache: "no-store", ...init });
+}
+
+/** Whether folders have to be opened by the user, and whether this browser can. */
+export const OPENS_FOLDERS = within && "showDirectoryPicker" in globalThis;
+
+/** Lets the user open a folder, whose files the program sees as they come. */
+export function holdFolder() {
+  if (!within) throw new Error("The program opens folders itself.");
+  return within.holdFolder();
 }
 
 /** The stream of events. */

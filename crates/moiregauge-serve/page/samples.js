@@ -1,11 +1,14 @@
 // Samples: the table of a campaign, two of them side by side, trends.
 
-import { get, query } from "./api.js";
+import { get, query, send } from "./api.js";
 import { baseName, empty, field, fill, h, scroll, select } from "./dom.js";
 import { number, withError } from "./format.js";
-import { showing } from "./host.js";
+import { onHappening } from "./events.js";
+import { leading, showing } from "./host.js";
 import { Plot } from "./plot.js";
+import { general } from "./settings.js";
 import { store } from "./store.js";
+import { work } from "./work.js";
 
 /** Columns with an error of their own, which is shown with them. */
 const PAIRS = /** @type {Record<string, string>} */ ({
@@ -40,16 +43,62 @@ export class SamplesView {
     this.trend = new Plot({ title: "Trend", x: [], xLabel: "Sample", series: [] });
     this.trend.element.hidden = true;
     this.quantity = select([["twist_deg", "Twist"], ["heterostrain_percent", "Heterostrain"], ["drift_x_nm_per_min", "Drift x"], ["drift_y_nm_per_min", "Drift y"]], "twist_deg", () => this.showTrend());
+    /** The campaign that runs. */
+    this.campaign = "";
+    this.run = h("button", { type: "button", text: "Analyse the samples in it", onclick: () => this.begin() });
+    this.cancel = h("button", { type: "button", text: "Cancel", disabled: true, onclick: () => this.end() });
+    this.state = h("p", { class: "stage-words", role: "status" });
+    this.taken = h("p", {});
+    onHappening("campaign", (event) => this.happened(event));
     this.trendBar = h("div", { hidden: true }, field("Trend of", this.quantity));
     this.element = h("div", { class: "columns" },
-      h("section", { "aria-label": "Campaign" }, h("h2", { text: "Samples" }), field("Folder of results", this.folder), this.trendBar,
+      h("section", { "aria-label": "Campaign" }, h("h2", { text: "Samples" }), field("Folder of results", this.folder), this.taken, this.trendBar,
+        h("h3", { text: "Campaign" }), h("p", { class: "hint", text: "Each folder of scans below the chosen one is a sample. Settings are those of the last analysis." }),
+        h("div", { class: "buttons" }, this.run, this.cancel), this.state,
         h("p", { class: "hint", text: "Click the head of a column to sort. Tick two samples to see them side by side." })),
       h("section", { class: "middle", "aria-label": "Samples" }, this.host, this.trend.element, this.compare));
-    fill(this.host, empty("Choose the folder with the results of moiregauge campaign. You see one row for each sample, with a picture."));
+    fill(this.host, empty("Choose the folder with the results of a campaign, or a folder of samples to analyse. You see one row for each sample, with a picture."));
   }
 
+  /** Folders may have been dropped since. */
   shown() {
-    return (this.reading ??= this.offerFolders());
+    return (this.reading ??= this.offerFolders().finally(() => (this.reading = null)));
+  }
+
+  async begin() {
+    try {
+      const [root, under] = JSON.parse(this.folder.value || "[]");
+      if (!root) throw new Error("Choose a folder of samples.");
+      const { campaign } = await send("POST", "campaigns", { root, under, settings: general(work.is?.settings ?? {}), known: work.is?.known ?? {} });
+      this.campaign = campaign;
+      await this.follow();
+    } catch (error) {
+      this.failed(/** @type {Error} */ (error).message);
+    }
+  }
+
+  async end() {
+    await send("POST", `campaigns/${this.campaign}/cancel`).catch((error) => this.failed(error.message));
+  }
+
+  /** @param {import("./events.js").Happening} event */
+  happened(event) {
+    if (event.id !== this.campaign) return;
+    if (event.state !== "running") this.follow(event.state);
+    else if (event.of) this.state.textContent = `${event.done} of ${event.of} samples`;
+  }
+
+  /** How the campaign stands; when it is done its table is shown. @param {string} [ended] a state that the program may not know any more */
+  async follow(ended) {
+    const is = ended === "cancelled" ? { state: ended } : await get(`campaigns/${this.campaign}`);
+    const running = is.state === "running";
+    this.run.disabled = running;
+    this.cancel.disabled = !running;
+    this.state.textContent = { running: "Running", cancelled: "Cancelled. Begun again, it goes on where it was.", failed: is.error ?? "", done: is.failed > 0 ? `Done; ${is.failed} without a result.` : "Done." }[/** @type {string} */ (is.state)] ?? "";
+    if (is.state !== "done") return;
+    await this.shown();
+    this.folder.value = JSON.stringify([is.root, is.under]);
+    await this.load();
   }
 
   async offerFolders() {
@@ -59,9 +108,10 @@ export class SamplesView {
       for (const root of store.state.roots) await this.walk(root, "", 2, found);
     } catch (error) {
       this.failed(/** @type {Error} */ (error).message);
-      this.reading = null;
     }
+    const chosen = this.folder.value;
     fill(this.folder, found.map(([v, words]) => h("option", { value: v, text: words })));
+    if (found.some(([v]) => v === chosen)) this.folder.value = chosen;
   }
 
   /** @param {any} root @param {string} under @param {number} depth @param {[string, string][]} found */
@@ -90,6 +140,7 @@ export class SamplesView {
       fill(this.host, empty(e.missing ? "This version of the program cannot show campaigns." : [e.message, e.what].filter(Boolean).join(" ")));
     }
     if (this.table.rows.length > 0) this.show();
+    fill(this.taken, this.table.rows.length > 0 && leading(h("a", { class: "button", download: "campaign.zip", text: "Table and page as zip" }), `samples/archive.zip${query({ root, under })}`));
     fill(this.compare);
     this.showTrend();
   }

@@ -28,6 +28,12 @@ const ENTRIES = [
   { key: "overlap", label: "Only the region all scans share", kind: "check", usual: false, more: true },
 ];
 
+/** The settings that are not about a certain lattice or certain scans. @param {any} settings */
+export function general(settings) {
+  const keys = [...ENTRIES.map((e) => e.key), "layers_chosen"];
+  return Object.fromEntries(Object.entries(settings).filter(([key]) => keys.includes(key)));
+}
+
 export class SettingsForm {
   /** @param {() => void} changed */
   constructor(changed) {

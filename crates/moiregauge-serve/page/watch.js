@@ -4,6 +4,7 @@ import { get, query, send } from "./api.js";
 import { baseName, empty, field, fill, h, say, scroll, select, table } from "./dom.js";
 import { onHappening } from "./events.js";
 import { plusMinus, total } from "./format.js";
+import { IN_ONE_FILE, OPENS_FOLDERS, holdFolder } from "./host.js";
 import { Plot } from "./plot.js";
 import { caveatList, first, lines } from "./result.js";
 import { store } from "./store.js";
@@ -21,7 +22,7 @@ export class WatchView {
     this.following = "";
     this.looks = 0;
     this.answered = 0;
-    this.folder = select([["", "reading the folders …"]], "", () => undefined);
+    this.folder = select([["", IN_ONE_FILE ? "none is open" : "reading the folders …"]], "", () => undefined);
     this.until = h("input", { type: "number", min: 0, step: "any", placeholder: "none" });
     this.of = select([["twist_deg", "twist (°)"], ["strain_percent", "heterostrain (%)"]], "twist_deg", () => undefined);
     this.start = h("button", { type: "button", class: "main", text: "Watch", onclick: () => this.begin() });
@@ -33,9 +34,9 @@ export class WatchView {
     this.frames = scroll("Results of all frames");
     this.advice = h("div", {});
     this.element = h("div", { class: "columns" },
-      h("section", { "aria-label": "Folder to watch" }, h("h2", { text: "Watch a folder" }), field("Folder", this.folder),
+      h("section", { "aria-label": "Folder to watch" }, h("h2", { text: "Watch a folder" }), field("Folder", this.folder), OPENS_FOLDERS && h("button", { type: "button", text: "Open a folder…", onclick: () => this.hold() }),
         field("Stop at an error of", this.of), field("Wanted error", this.until), h("div", { class: "buttons" }, this.start, this.stop), this.state,
-        store.state.watches_folders === false && h("p", { class: "hint", text: "This file cannot hold a folder open: moiregauge watch and moiregauge serve do." }),
+        IN_ONE_FILE && !OPENS_FOLDERS && h("p", { class: "hint", text: "This browser cannot hold a folder open: Chromium, Chrome and Edge can, and so do moiregauge watch and moiregauge serve." }),
         h("p", { class: "hint", text: "New scans are analysed as soon as their files are complete. Nothing is written into the folder." })),
       this.body);
     onHappening("watch", (event) => this.happened(event));
@@ -79,8 +80,21 @@ export class WatchView {
     if (known.length > 0) await this.take(known[known.length - 1]).catch(() => undefined);
   }
 
+  /** A folder that the user opens. */
+  async hold() {
+    try {
+      const { root, under, name } = await holdFolder();
+      this.folder.append(h("option", { value: JSON.stringify([root, under]), text: name, selected: true }));
+    } catch (error) {
+      // Closed without a choice.
+      if (/** @type {Error} */ (error).name !== "AbortError") this.failed(/** @type {Error} */ (error).message);
+    }
+  }
+
   /** Folders to the third level below the roots. */
   async offerFolders() {
+    // There are those that the user opens.
+    if (IN_ONE_FILE) return;
     /** @type {[string, string][]} */
     const found = [];
     const walk = async (/** @type {any} */ root, /** @type {string} */ under, /** @type {number} */ depth) => {
@@ -101,7 +115,8 @@ export class WatchView {
 
   async begin() {
     try {
-      const [root, under] = JSON.parse(this.folder.value);
+      const [root, under] = JSON.parse(this.folder.value || "[]");
+      if (!root) return this.failed("Open a folder first.");
       const wish = Number(this.until.value) > 0 ? { until: { [this.of.value]: Number(this.until.value) } } : {};
       const { watch } = await send("POST", "watches", { root, under, ...wish });
       await this.take(watch);

@@ -15,7 +15,7 @@ use crate::error::ServeError;
 use crate::host::{self, Hub};
 use crate::options::Options;
 use crate::roots::Roots;
-use crate::work::{Maps, Watches, Works};
+use crate::work::{Campaigns, Maps, Watches, Works};
 
 /// What answers, without an address.
 #[derive(Debug)]
@@ -31,9 +31,10 @@ impl Alone {
         let hub = Arc::new(Hub);
         let app = App {
             options: options.clone(),
-            works: Works::new(&hub, options.words, options.keep.as_deref(), &roots),
-            maps: Maps::new(&hub, options.words),
-            watches: Watches::new(&hub, options.words),
+            works: Works::new(&hub, options.advice, options.keep.as_deref(), &roots),
+            maps: Maps::new(&hub, options.advice),
+            campaigns: Campaigns::new(&hub, options.advice),
+            watches: Watches::new(&hub, options.advice),
             roots,
             scans: Scans::default(),
         };
@@ -49,8 +50,9 @@ impl Alone {
         Some((Response::from_parts(head, ()), body.ok()?.into()))
     }
 
-    /// Does what was begun and waits longest; whether there was anything. Events go to the standard output.
-    pub fn turn(&self) -> bool {
+    /// Does what was begun and waits longest; how long there is nothing to do then, `None`: for ever. Events go to the
+    /// standard output.
+    pub fn turn(&self) -> Option<std::time::Duration> {
         host::turn()
     }
 }

@@ -11,7 +11,7 @@ use crate::host::Hub;
 use crate::lock::lock;
 use crate::options::Options;
 use crate::roots::Roots;
-use crate::work::{Maps, Watches, Works};
+use crate::work::{Campaigns, Maps, Watches, Works};
 
 /// Bytes of decoded files that are kept for the next look.
 const KEPT_BYTES: usize = 256 << 20;
@@ -28,6 +28,7 @@ pub(crate) struct App {
     pub(crate) events: Arc<Hub>,
     pub(crate) works: Works,
     pub(crate) maps: Maps,
+    pub(crate) campaigns: Campaigns,
     pub(crate) watches: Watches,
 }
 

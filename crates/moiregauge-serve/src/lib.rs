@@ -42,12 +42,14 @@ mod roots;
 mod run;
 #[cfg(not(target_family = "wasm"))]
 mod token;
+mod typed;
 mod work;
 
 #[cfg(target_family = "wasm")]
 pub use alone::Alone;
 pub use error::ServeError;
 pub use feed::Feed;
-pub use options::{Options, Words};
+pub use options::Options;
 #[cfg(not(target_family = "wasm"))]
 pub use run::serve;
+pub use typed::{map_as_options, told_as_options};

@@ -4,34 +4,11 @@ use std::net::{IpAddr, Ipv4Addr};
 use std::path::PathBuf;
 
 use moiregauge_pipeline::campaign::{Advice, no_advice};
-use moiregauge_pipeline::maps::MapRequest;
-use moiregauge_report::results::UserSpecified;
 
 use crate::feed::Feed;
 
 /// Bytes of one uploaded file, at most.
 const UPLOAD_LIMIT: u64 = 4 << 30;
-
-/// How a program names its own options.
-#[derive(Clone, Copy, Debug)]
-pub struct Words {
-    /// What helps against an error.
-    pub advice: Advice,
-    /// The options that tell the program what is known of files.
-    pub told: fn(&UserSpecified) -> Vec<String>,
-    /// The options that tell the program what map is wanted.
-    pub map: fn(&MapRequest) -> Vec<String>,
-}
-
-impl Default for Words {
-    fn default() -> Self {
-        Self {
-            advice: no_advice,
-            told: |_| Vec::new(),
-            map: |_| Vec::new(),
-        }
-    }
-}
 
 /// What a server is started with.
 #[derive(Clone, Debug)]
@@ -54,8 +31,8 @@ pub struct Options {
     pub browser: bool,
     /// Bytes of one uploaded file, at most.
     pub upload_limit: u64,
-    /// What the program says.
-    pub words: Words,
+    /// What helps against an error, in the words of the program.
+    pub advice: Advice,
 }
 
 impl Default for Options {
@@ -70,7 +47,7 @@ impl Default for Options {
             feed: None,
             browser: false,
             upload_limit: UPLOAD_LIMIT,
-            words: Words::default(),
+            advice: no_advice,
         }
     }
 }

@@ -22,7 +22,7 @@ use crate::options::Options;
 use crate::page::Page;
 use crate::roots::Roots;
 use crate::token::Secret;
-use crate::work::{Maps, Watches, Works};
+use crate::work::{Campaigns, Maps, Watches, Works};
 
 /// How often the wish to stop is looked for.
 const OFTEN: Duration = Duration::from_millis(100);
@@ -69,9 +69,10 @@ pub fn serve(
         let run = Secret::random()?;
         let ticket = Secret::random()?;
         let hub = Arc::new(Hub::new(&run.text()[..8]));
-        let works = Works::new(&hub, options.words, options.keep.as_deref(), &roots);
-        let maps = Maps::new(&hub, options.words);
-        let watches = Watches::new(&hub, options.words);
+        let works = Works::new(&hub, options.advice, options.keep.as_deref(), &roots);
+        let maps = Maps::new(&hub, options.advice);
+        let campaigns = Campaigns::new(&hub, options.advice);
+        let watches = Watches::new(&hub, options.advice);
         options.feed.iter().for_each(|feed| watches.listen(feed));
         let app = Arc::new(App {
             options: options.clone(),
@@ -88,6 +89,7 @@ pub fn serve(
             events: hub,
             works,
             maps,
+            campaigns,
             watches,
         });
         let shown = url(here, &app.door.token);
@@ -104,6 +106,7 @@ pub fn serve(
         accepting.abort();
         app.works.cancel();
         app.maps.cancel();
+        app.campaigns.cancel();
         app.watches.cancel();
         Ok(app)
     });

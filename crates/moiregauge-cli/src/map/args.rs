@@ -131,3 +131,35 @@ impl MapArgs {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use clap::Parser;
+    use moiregauge_serve::map_as_options;
+
+    use super::*;
+
+    #[derive(Parser)]
+    struct Typed {
+        #[command(flatten)]
+        map: MapArgs,
+    }
+
+    #[test]
+    fn options_ask_for_the_same() {
+        let text = r#"{
+            "method": "tiles", "margin": 1.5, "window_nm": 12.25, "in_bands": true,
+            "domains": {"when": "on", "nodes": "dark"},
+            "questions": {
+                "regions": [{"name": "bar", "corners_nm": [[0, 0], [4, -1], [0, 2]]}],
+                "profiles": [{"name": "cut", "ends_nm": [[0, 0], [3, 4]]}],
+                "device": {"size_nm": [40, 20], "orientations": 3}
+            }
+        }"#;
+        let request: MapRequest = serde_json::from_str(text).unwrap();
+        let typed = ["map", "scan", "--out", "out"].map(str::to_owned);
+        let typed = typed.into_iter().chain(map_as_options(&request));
+        assert_eq!(Typed::parse_from(typed).map.request(), request);
+        assert!(map_as_options(&MapRequest::default()).is_empty());
+    }
+}

@@ -11,7 +11,7 @@ use moiregauge_serve::{Feed, Options};
 
 use super::duration;
 use crate::analyze::AnalyzeArgs;
-use crate::serve::words;
+use crate::errors::advice;
 
 /// Options of an analysis that make or describe results that are written once.
 const NOT_HERE: [&str; 15] = [
@@ -151,7 +151,7 @@ impl WatchArgs {
             port: self.port,
             browser: !self.no_browser,
             feed: Some(feed.clone()),
-            words: words(),
+            advice,
             ..Options::default()
         };
         self.serve.then_some((options, feed))

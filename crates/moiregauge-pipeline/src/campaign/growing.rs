@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize, Serializer};
 use super::channel::Other;
 use super::error::AnalyseError;
 use super::failure::{Advice, no_advice};
-use super::kept::{Kept, With};
+use super::kept::{Heard, Kept, With};
 use super::measure::{Inputs, Measured, given_again, measured};
 use super::overlap::overlap;
 use super::shown::show;
@@ -43,6 +43,17 @@ pub struct Campaign {
     /// All that is written.
     of: Written,
     advice: Words,
+    heard: Listener,
+}
+
+/// Who is given each file as soon as it is measured; not part of what is written.
+#[derive(Clone, Default)]
+struct Listener(Option<Heard>);
+
+impl std::fmt::Debug for Listener {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_tuple("Listener").field(&self.0.is_some()).finish()
+    }
 }
 
 /// A campaign as it is written.
@@ -71,8 +82,11 @@ impl TryFrom<Written> for Campaign {
     fn try_from(of: Written) -> Result<Self, Self::Error> {
         of.settings.check()?;
         check_user_specified(&of.told)?;
-        let advice = Words::default();
-        Ok(Self { of, advice })
+        Ok(Self {
+            of,
+            advice: Words::default(),
+            heard: Listener::default(),
+        })
     }
 }
 
@@ -178,6 +192,13 @@ impl Campaign {
     #[must_use]
     pub fn with_advice(mut self, advice: Advice) -> Self {
         self.advice = Words(advice);
+        self
+    }
+
+    /// With somebody who is given each file as soon as it is measured.
+    #[must_use]
+    pub fn heard_by(mut self, heard: Option<Heard>) -> Self {
+        self.heard = Listener(heard);
         self
     }
 
@@ -308,6 +329,7 @@ impl Campaign {
             known: &known,
             window: window.as_ref(),
             advice: self.advice.0,
+            heard: self.heard.0.as_ref(),
         };
         let Measured { files, other } = measured(&from, &self.of.settings, &mut self.of.kept, job)?;
         let settings = other.as_ref().map_or(&self.of.settings, |o| &o.settings);

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use moiregauge::scan::{MeasuredScan, Window};
 use moiregauge::settings::Settings;
@@ -58,7 +59,8 @@ impl Kept {
         self.files.get(key)
     }
 
-    pub(super) fn extend(&mut self, other: Self) {
+    /// Takes what others measured.
+    pub fn extend(&mut self, other: Self) {
         self.files.extend(other.files);
         // Where dates are not trusted, files are read again.
         if let (Some(read), Some(others)) = (&mut self.read, other.read) {
@@ -90,10 +92,21 @@ impl Kept {
         }
     }
 
+    /// One file.
+    pub(super) fn of(key: &str, measured: Result<Vec<MeasuredScan>, Failure>) -> Self {
+        let mut kept = Self::default();
+        kept.put(key.to_owned(), measured);
+        kept
+    }
+
     pub(super) fn put(&mut self, key: String, measured: Result<Vec<MeasuredScan>, Failure>) {
         self.files.insert(key, measured);
     }
 }
+
+/// Somebody who is given every file as soon as it is measured, with its key: what he keeps is not lost if the process ends
+/// before the work does.
+pub type Heard = Arc<dyn Fn(&str, Kept) + Send + Sync>;
 
 /// Measured scans as they are written.
 #[derive(Serialize, Deserialize)]

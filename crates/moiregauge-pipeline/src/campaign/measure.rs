@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use super::channel::{Other, others};
 use super::failure::{Advice, Failure};
-use super::kept::{Kept, With};
+use super::kept::{Heard, Kept, With};
 use crate::job::{Cancelled, Job};
 use crate::known::Known;
 use crate::memory::enough_for;
@@ -31,6 +31,8 @@ pub(super) struct Inputs<'a> {
     pub(super) known: &'a Known,
     pub(super) window: Option<&'a Window>,
     pub(super) advice: Advice,
+    /// Who is given each file as soon as it is measured.
+    pub(super) heard: Option<&'a Heard>,
 }
 
 /// The moirés of a file and what identifies it, or why there are none.
@@ -79,10 +81,13 @@ impl Inputs<'_> {
         let all = job.run(|| {
             let all = self.files.par_iter().map(|path| {
                 let (key, result) = self.one(path, settings, &with, known_before, &read);
-                if let (Some(key), Ok((moires, _))) = (&key, &result) {
-                    keep(&new, key.clone(), Ok(moires.clone()));
-                } else if let (Some(key), Err(failure)) = (key, &result) {
-                    keep(&new, key, Err(failure.clone()));
+                if let Some(key) = key {
+                    let measured = result.as_ref().map(|(moires, _)| moires.clone());
+                    let measured = measured.map_err(Clone::clone);
+                    if let Some(heard) = self.heard {
+                        heard(&key, Kept::of(&key, measured.clone()));
+                    }
+                    keep(&new, key, measured);
                 }
                 stage.step();
                 result

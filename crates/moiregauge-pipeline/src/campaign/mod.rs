@@ -20,7 +20,7 @@ pub use error::{AnalyseError, Place};
 pub use failure::{Advice, in_words, no_advice};
 pub use growing::{Campaign, Outcome};
 pub use journal::{Journal, JournalError};
-pub use kept::Kept;
+pub use kept::{Heard, Kept};
 pub use measure::{given_again, measure_file};
 pub use outcomes::outcomes;
 pub use scans::Scans;

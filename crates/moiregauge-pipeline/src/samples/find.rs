@@ -76,13 +76,21 @@ fn name(root: &Path, path: &Path) -> String {
 /// A folder cannot be read; there are no scans at all.
 pub fn samples_in(root: &Path, leave: &Path) -> Result<Vec<Sample>, SamplesError> {
     let mut found = Vec::new();
-    let leave = leave.canonicalize().ok();
+    let leave = real(leave).ok();
     walk(root, root, leave.as_deref(), &mut Vec::new(), &mut found)?;
     if found.is_empty() {
         return Err(SamplesError::NoSamples(root.to_owned()));
     }
     found.sort_by(|a, b| a.name.cmp(&b.name));
     Ok(found)
+}
+
+/// Where a folder is, without links; in memory there are none.
+fn real(folder: &Path) -> std::io::Result<PathBuf> {
+    if cfg!(target_family = "wasm") {
+        return Ok(folder.to_owned());
+    }
+    folder.canonicalize()
 }
 
 /// Looks through a folder; `above` are the folders above it, lest links lead round in circles.
@@ -93,7 +101,7 @@ fn walk(
     above: &mut Vec<PathBuf>,
     found: &mut Vec<Sample>,
 ) -> Result<(), SamplesError> {
-    let real = folder.canonicalize().map_err(at(folder))?;
+    let real = real(folder).map_err(at(folder))?;
     if Some(real.as_path()) == leave || above.contains(&real) || holds_results(folder) {
         return Ok(());
     }

@@ -21,6 +21,14 @@ pub(super) const PARTS: &str = "parts";
 pub(super) const OLD: &str = "old";
 pub(super) const INTENT: &str = "intent.json";
 
+/// The number of the process; a browser has one.
+fn process() -> u32 {
+    if cfg!(target_family = "wasm") {
+        return 0;
+    }
+    std::process::id()
+}
+
 #[cfg_attr(
     target_family = "wasm",
     expect(dead_code, reason = "a browser has no locks")
@@ -106,7 +114,7 @@ impl Work {
         sweep(folder);
         loop {
             let number = NEXT.fetch_add(1, Ordering::Relaxed);
-            let dir = folder.join(format!("{UNFINISHED}-{}-{number}", std::process::id()));
+            let dir = folder.join(format!("{UNFINISHED}-{}-{number}", process()));
             match std::fs::create_dir(&dir) {
                 Ok(()) => {}
                 Err(error) if error.kind() == io::ErrorKind::AlreadyExists => continue,

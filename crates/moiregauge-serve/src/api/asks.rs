@@ -1,9 +1,8 @@
-//! Questions without files: moirés, plans, caveats, materials, settings; and tables of many samples.
+//! Questions without files: moirés, plans, caveats, materials, settings.
 
 use std::sync::Arc;
 
 use axum::body::Body;
-use axum::extract::{Query, State};
 use axum::http::{HeaderMap, header};
 use axum::response::IntoResponse as _;
 use axum::routing::{get, post};
@@ -14,14 +13,13 @@ use moiregauge::settings::Settings;
 use moiregauge::simulate::Simulation;
 use moiregauge_pipeline::moire::{Given, Moire, MoireQuestion};
 use moiregauge_pipeline::plan::PlanRequest;
-use moiregauge_pipeline::samples::samples_shown;
 use moiregauge_pipeline::{Job, conditions_on, moire, plan, settings_on};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
-use crate::app::{App, Shared};
+use crate::app::App;
 use crate::body::document;
-use crate::host::{self, beside};
+use crate::host::beside;
 use crate::problem::{Answer, Problem};
 
 pub(super) fn routes() -> Router<Arc<App>> {
@@ -32,8 +30,6 @@ pub(super) fn routes() -> Router<Arc<App>> {
         .route("/caveats", get(caveats))
         .route("/materials", get(materials))
         .route("/defaults", get(defaults))
-        .route("/samples", get(samples))
-        .route("/samples/picture", get(picture))
 }
 
 #[derive(Deserialize)]
@@ -115,51 +111,4 @@ async fn defaults() -> Answer<Json<Value>> {
     serde_json::to_value(Settings::default())
         .map(Json)
         .map_err(Problem::fault)
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct OfSamples {
-    root: String,
-    #[serde(default)]
-    under: String,
-    /// The name of a picture in the folder.
-    name: Option<String>,
-}
-
-async fn samples(State(app): Shared, Query(asked): Query<OfSamples>) -> Answer<Json<Value>> {
-    beside(move || {
-        let folder = app.roots.folder(&asked.root, &asked.under)?;
-        let shown = samples_shown(&folder.real).map_err(|e| Problem::unusable(&e).at("under"))?;
-        serde_json::to_value(shown)
-            .map(Json)
-            .map_err(Problem::fault)
-    })
-    .await
-}
-
-async fn picture(State(app): Shared, Query(asked): Query<OfSamples>) -> Answer {
-    beside(move || {
-        let name = asked.name.unwrap_or_default();
-        let parts = format!("{}/parts", asked.under);
-        let folder = app
-            .roots
-            .folder(&asked.root, parts.trim_start_matches('/'))?;
-        let missing = || Problem::missing("no such picture").at("name");
-        let stem = name
-            .strip_prefix("parts/")
-            .and_then(|n| n.strip_suffix(".png"));
-        let stem = stem.ok_or_else(missing)?;
-        if stem.is_empty() || !stem.bytes().all(|b| b.is_ascii_hexdigit()) {
-            return Err(missing());
-        }
-        let file = folder.real.join(format!("{stem}.png"));
-        let real = host::real(&file).map_err(|_| missing())?;
-        if !real.starts_with(&folder.real) {
-            return Err(missing());
-        }
-        let bytes = std::fs::read(real).map_err(|_| missing())?;
-        Ok(([(header::CONTENT_TYPE, "image/png")], bytes).into_response())
-    })
-    .await
 }

@@ -106,7 +106,7 @@ pub(super) async fn inspect(
     beside(move || {
         let file = app.roots.file(&asked.file)?;
         let known = known_of(&file, asked.known.as_deref())?;
-        let info = moiregauge_pipeline::inspect(&file.name, &known, &[], app.options.words.advice);
+        let info = moiregauge_pipeline::inspect(&file.name, &known, &[], app.options.advice);
         let mut told = serde_json::to_value(&info).map_err(Problem::fault)?;
         told["header"] = info
             .scan

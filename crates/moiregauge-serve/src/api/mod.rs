@@ -2,6 +2,7 @@
 
 mod asks;
 mod binary;
+mod campaigns;
 mod demo;
 mod files;
 mod images;
@@ -38,6 +39,7 @@ fn asked() -> Router<Arc<App>> {
         .merge(works::routes())
         .merge(maps::routes())
         .merge(asks::routes())
+        .merge(campaigns::routes())
         .merge(watches::routes())
         .fallback(nothing)
 }

@@ -17,7 +17,6 @@ pub(super) async fn state(State(app): Shared) -> Json<Value> {
         "version": moiregauge_pipeline::VERSION,
         "roots": roots,
         "upload_limit_bytes": app.options.upload_limit,
-        "watches_folders": host::WATCHES_FOLDERS,
         "saves": host::SAVES && app.options.keep.is_some(),
         "works": app.works.ids(),
         "maps": app.maps.ids(),

@@ -16,7 +16,7 @@ use serde_json::{Map, Value};
 
 use crate::app::{App, Shared};
 use crate::body::document;
-use crate::host::beside;
+use crate::host::{DROPPED_CHANGES, beside};
 use crate::problem::{Answer, Problem};
 use crate::roots::DROPPED;
 
@@ -43,7 +43,7 @@ struct Wanted {
 async fn add(State(app): Shared, headers: HeaderMap, body: Body) -> Answer<Json<Value>> {
     let wanted: Wanted = document(&headers, body).await?;
     beside(move || {
-        if wanted.root == DROPPED {
+        if wanted.root == DROPPED && !DROPPED_CHANGES {
             return Err(
                 Problem::wrong("a microscope cannot save into a folder of the page").at("root"),
             );
@@ -54,7 +54,11 @@ async fn add(State(app): Shared, headers: HeaderMap, body: Body) -> Answer<Json<
         let folder = app.roots.folder(&wanted.root, &wanted.under)?;
         let settings = settings_on(Settings::default(), wanted.settings);
         let watched = app.watches.add(WatchRequest {
-            folder: folder.name,
+            folder: if wanted.root == DROPPED {
+                folder.real
+            } else {
+                folder.name
+            },
             settings: settings.map_err(|e| Problem::wrong(e).at("settings"))?,
             told: wanted.known,
             until: wanted.until,

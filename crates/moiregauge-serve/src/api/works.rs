@@ -225,7 +225,7 @@ async fn overlay(
 async fn outputs(State(app): Shared, Path(id): Id) -> Answer<Json<Value>> {
     beside(move || {
         let (done, kept) = app.works.get(&id)?.done()?;
-        Ok(written::listed(&*done.written(&app.options.words, &kept)?))
+        Ok(written::listed(&*done.written(app.options.advice, &kept)?))
     })
     .await
 }
@@ -233,7 +233,7 @@ async fn outputs(State(app): Shared, Path(id): Id) -> Answer<Json<Value>> {
 async fn output(State(app): Shared, Path((id, name)): Path<(String, String)>) -> Answer {
     beside(move || {
         let (done, kept) = app.works.get(&id)?.done()?;
-        written::one(&*done.written(&app.options.words, &kept)?, &name)
+        written::one(&*done.written(app.options.advice, &kept)?, &name)
     })
     .await
 }
@@ -241,7 +241,7 @@ async fn output(State(app): Shared, Path((id, name)): Path<(String, String)>) ->
 async fn zip(State(app): Shared, Path(id): Id) -> Answer {
     beside(move || {
         let (done, kept) = app.works.get(&id)?.done()?;
-        let all = done.written(&app.options.words, &kept)?;
+        let all = done.written(app.options.advice, &kept)?;
         written::zipped(&all, "attachment; filename=\"moiregauge.zip\"")
     })
     .await
@@ -249,7 +249,7 @@ async fn zip(State(app): Shared, Path(id): Id) -> Answer {
 
 async fn command_line(State(app): Shared, Path(id): Id) -> Answer<Json<Value>> {
     let asked = app.works.get(&id)?.asked();
-    let command = command(&asked, &app.options.words)?;
+    let command = command(&asked)?;
     Ok(Json(json!({
         "command": command.trim_end(),
         "settings": asked.settings_file()?,

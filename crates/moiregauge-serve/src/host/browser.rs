@@ -4,20 +4,25 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use axum::body::Body;
+use moiregauge_pipeline::Cancel;
 
 use crate::problem::{Answer, Problem};
 
-/// Whether folders can be held open.
-pub(crate) const WATCHES_FOLDERS: bool = false;
+/// Whether what was dropped can change: a folder that the page holds open.
+pub(crate) const DROPPED_CHANGES: bool = true;
 /// Whether what is kept outlives the page: it outlives what is ended in the middle of a run.
 pub(crate) const SAVES: bool = false;
 
 thread_local! {
     static WAITING: RefCell<VecDeque<Box<dyn FnOnce()>>> = RefCell::default();
+    static LATER: RefCell<Vec<Again>> = RefCell::default();
 }
+
+/// What is done again and again: when next, after what time again, what.
+type Again = (Instant, Duration, Box<dyn FnMut() -> bool>);
 
 /// Work that is begun: nothing runs beside.
 pub(crate) type Running = ();
@@ -28,10 +33,37 @@ pub(crate) fn begin(work: impl FnOnce() + Send + 'static) -> io::Result<Running>
     Ok(())
 }
 
-/// Does what waits longest; whether there was anything.
-pub(crate) fn turn() -> bool {
-    let next = WAITING.with_borrow_mut(VecDeque::pop_front);
-    next.map(|work| work()).is_some()
+/// Does something again and again, until it has no more to do.
+pub(crate) fn repeat(
+    every: Duration,
+    _: Cancel,
+    step: impl FnMut() -> bool + 'static,
+) -> io::Result<()> {
+    LATER.with_borrow_mut(|later| later.push((Instant::now(), every, Box::new(step))));
+    Ok(())
+}
+
+/// Does what waits longest, or what is to be done again; how long there is nothing to do then, `None`: for ever.
+pub(crate) fn turn() -> Option<Duration> {
+    if let Some(work) = WAITING.with_borrow_mut(VecDeque::pop_front) {
+        work();
+    } else {
+        let due = |later: &mut Vec<Again>| {
+            let now = Instant::now();
+            let place = later.iter().position(|(at, ..)| *at <= now)?;
+            Some(later.remove(place))
+        };
+        if let Some((_, every, mut step)) = LATER.with_borrow_mut(due)
+            && step()
+        {
+            LATER.with_borrow_mut(|later| later.push((Instant::now() + every, every, step)));
+        }
+    }
+    if WAITING.with_borrow(|waiting| !waiting.is_empty()) {
+        return Some(Duration::ZERO);
+    }
+    let next = LATER.with_borrow(|later| later.iter().map(|(at, ..)| *at).min());
+    next.map(|at| at.saturating_duration_since(Instant::now()))
 }
 
 /// What was begun before has ended.

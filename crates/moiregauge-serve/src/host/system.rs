@@ -2,21 +2,24 @@
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use axum::body::{Body, Bytes};
 use axum::http::StatusCode;
+use moiregauge_pipeline::Cancel;
 use tempfile::NamedTempFile;
 
 use crate::body::pieces;
 use crate::problem::{Answer, Problem};
 
-/// Whether folders can be held open.
-pub(crate) const WATCHES_FOLDERS: bool = true;
+/// Whether what was dropped can change: a folder that the page holds open.
+pub(crate) const DROPPED_CHANGES: bool = false;
 /// Whether what is kept outlives the page.
 pub(crate) const SAVES: bool = true;
 /// Room on the stack of a thread that waits for a job.
 const STACK: usize = 8 << 20;
+/// Between two looks whether something was cancelled.
+const OFTEN: Duration = Duration::from_millis(100);
 
 /// Work that runs beside.
 pub(crate) type Running = std::thread::JoinHandle<()>;
@@ -24,6 +27,26 @@ pub(crate) type Running = std::thread::JoinHandle<()>;
 /// Begins work that takes its time.
 pub(crate) fn begin(work: impl FnOnce() + Send + 'static) -> std::io::Result<Running> {
     std::thread::Builder::new().stack_size(STACK).spawn(work)
+}
+
+/// Does something again and again, until it has no more to do; what is cancelled is called once more at once.
+pub(crate) fn repeat(
+    every: Duration,
+    cancel: Cancel,
+    mut step: impl FnMut() -> bool + Send + 'static,
+) -> std::io::Result<()> {
+    let driven = begin(move || {
+        loop {
+            let begun = Instant::now();
+            if !step() {
+                return;
+            }
+            while begun.elapsed() < every && !cancel.is_cancelled() {
+                std::thread::sleep(OFTEN);
+            }
+        }
+    });
+    driven.map(drop)
 }
 
 /// Waits until work has ended, however it did.

@@ -10,9 +10,9 @@ use moiregauge_report::results::{Run, UserSpecified};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use crate::options::Words;
 use crate::problem::{Answer, Problem};
 use crate::roots::{File, Roots};
+use crate::typed::told_as_options;
 
 /// The name of the settings file that goes with a command.
 pub(crate) const SETTINGS_FILE: &str = "settings.toml";
@@ -108,13 +108,13 @@ impl Asked {
     }
 
     /// The arguments of the program that asks the same, without where results go.
-    pub(crate) fn arguments(&self, words: &Words) -> Answer<Vec<String>> {
+    pub(crate) fn arguments(&self) -> Answer<Vec<String>> {
         let mut all = vec!["analyze".to_owned()];
         all.extend(self.files.iter().map(|file| in_words(&file.name)));
         if self.settings_file()?.is_some() {
             all.extend(["--config".to_owned(), SETTINGS_FILE.to_owned()]);
         }
-        all.extend((words.told)(&self.known));
+        all.extend(told_as_options(&self.known));
         Ok(all)
     }
 
@@ -147,10 +147,10 @@ impl Asked {
     }
 
     /// The run that the program would record.
-    pub(crate) fn run(&self, words: &Words) -> Answer<Run> {
+    pub(crate) fn run(&self) -> Answer<Run> {
         Ok(Run {
             command: "analyze".to_owned(),
-            arguments: self.arguments(words)?,
+            arguments: self.arguments()?,
             settings: self.effective(),
             known: self.known.clone(),
             sets: Vec::new(),
@@ -228,11 +228,16 @@ mod tests {
         let mut asked = Asked::nothing();
         asked.files = vec![file("1", "it's a.spm"), file("2", "b.spm")];
         assert_eq!(asked.settings_file().unwrap(), None);
-        let words = Words::default();
         assert_eq!(
-            quoted(&asked.arguments(&words).unwrap()),
+            quoted(&asked.arguments().unwrap()),
             r"analyze 'it'\''s a.spm' b.spm"
         );
+        asked.known.size_nm = Some([70.0, 35.5]);
+        assert_eq!(
+            quoted(&asked.arguments().unwrap()),
+            r"analyze 'it'\''s a.spm' b.spm --size 70nm×35.5nm"
+        );
+        asked.known.size_nm = None;
         asked.excluded = vec!["2".to_owned()];
         let options = r#"{"layers": "graphene/hBN", "by_hand": {"near_nm": 12.1}, "seed": 3, "frame_time_sigma_s": 0.3}"#;
         let options = serde_json::from_str(options).unwrap();
@@ -246,7 +251,7 @@ mod tests {
         assert_eq!(read, asked.effective());
         assert!(
             asked
-                .arguments(&words)
+                .arguments()
                 .unwrap()
                 .ends_with(&["--config".to_owned(), SETTINGS_FILE.to_owned()])
         );

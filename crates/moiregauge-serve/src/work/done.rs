@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
-use moiregauge_pipeline::campaign::{AnalyseError, Campaign, Kept, Outcome, outcomes};
+use moiregauge_pipeline::campaign::{
+    Advice, AnalyseError, Campaign, Heard, Kept, Outcome, outcomes,
+};
 use moiregauge_pipeline::sink::{MemorySink, Sink as _};
 use moiregauge_pipeline::{Cancel, Found, Job, Known, Quiet, record_files};
 use moiregauge_report::results::{Results, Run};
@@ -12,7 +14,6 @@ use moiregauge_report::{FailedInput, write_report};
 use super::asked::{Asked, SETTINGS_FILE, quoted};
 use super::task::{NoResult, run_beside};
 use crate::lock::lock;
-use crate::options::Words;
 use crate::problem::{Answer, Problem};
 use crate::roots::places;
 
@@ -68,14 +69,15 @@ impl Done {
         }
     }
 
-    /// Analyses what is asked; `kept` takes what was measured, however it ends.
+    /// Analyses what is asked; `kept` takes what was measured, however it ends, and `heard` each file at once.
     pub(crate) fn of(
         asked: &Asked,
-        words: &Words,
+        advice: Advice,
         kept: &mut Kept,
+        heard: Option<Heard>,
         job: &Job,
     ) -> Result<Self, NotDone> {
-        let outcomes = analysed(asked, words, kept, false, job)?;
+        let outcomes = analysed(asked, advice, kept, heard, false, job)?;
         let documents = outcomes.iter().map(|outcome| {
             let results = Results::new(&outcome.analysis, &outcome.provenance);
             let document = results.to_json();
@@ -90,7 +92,7 @@ impl Done {
     }
 
     /// The moirés behind the documents; those of a result that an earlier server left are analysed again of what was measured.
-    pub(crate) fn outcomes(&self, words: &Words, kept: &Kept) -> Answer<Arc<Vec<Outcome>>> {
+    pub(crate) fn outcomes(&self, advice: Advice, kept: &Kept) -> Answer<Arc<Vec<Outcome>>> {
         // Whoever asks meanwhile waits for the same.
         let mut outcomes = lock(&self.outcomes);
         if let Some(found) = &*outcomes {
@@ -98,7 +100,7 @@ impl Done {
         }
         let mut kept = kept.clone();
         let again = run_beside(&Cancel::new(), &Quiet, |job| {
-            Self::of(&self.asked, words, &mut kept, job)
+            Self::of(&self.asked, advice, &mut kept, None, job)
                 .map_err(|e| Problem::conflict(e.in_words().0))
         });
         let again = again.map_err(no_result)?;
@@ -112,7 +114,7 @@ impl Done {
     }
 
     /// Everything that the program would write, with the settings and the command.
-    pub(crate) fn written(&self, words: &Words, kept: &Kept) -> Answer<Arc<Written>> {
+    pub(crate) fn written(&self, advice: Advice, kept: &Kept) -> Answer<Arc<Written>> {
         // Whoever asks meanwhile waits for the same.
         let mut written = lock(&self.written);
         if let Some(files) = &*written {
@@ -120,9 +122,9 @@ impl Done {
         }
         let mut kept = kept.clone();
         let made = run_beside(&Cancel::new(), &Quiet, |job| {
-            let outcomes = analysed(&self.asked, words, &mut kept, true, job);
+            let outcomes = analysed(&self.asked, advice, &mut kept, None, true, job);
             let outcomes = outcomes.map_err(|e| Problem::wrong(e.in_words().0))?;
-            files(&self.asked, words, &outcomes)
+            files(&self.asked, &outcomes)
         });
         let made = Arc::new(made.map_err(no_result)?);
         *written = Some(Arc::clone(&made));
@@ -140,8 +142,9 @@ fn no_result(error: NoResult<Problem>) -> Problem {
 
 fn analysed(
     asked: &Asked,
-    words: &Words,
+    advice: Advice,
     kept: &mut Kept,
+    heard: Option<Heard>,
     illustrated: bool,
     job: &Job,
 ) -> Result<Vec<Outcome>, NotDone> {
@@ -152,13 +155,14 @@ fn analysed(
     let (inputs, left_out) = named.frames();
     let run = Run {
         left_out,
-        ..asked.run(words).map_err(NotDone::Other)?
+        ..asked.run().map_err(NotDone::Other)?
     };
     let places = places(&asked.files);
-    let campaign = Campaign::of_run(&run, &inputs, &places, words.advice);
+    let campaign = Campaign::of_run(&run, &inputs, &places, advice);
     let mut campaign = campaign
         .map_err(|e| NotDone::Other(Problem::wrong(e)))?
         .illustrated(illustrated)
+        .heard_by(heard)
         .trusting_dates();
     campaign.take(std::mem::take(kept));
     let found = outcomes(&run, &places, &mut campaign, job, |measured| {
@@ -172,9 +176,9 @@ fn analysed(
 }
 
 /// The files of a folder of results, and beside them what asks for the same.
-fn files(asked: &Asked, words: &Words, outcomes: &[Outcome]) -> Answer<Written> {
+fn files(asked: &Asked, outcomes: &[Outcome]) -> Answer<Written> {
     let sink = MemorySink::new();
-    let run = asked.run(words)?;
+    let run = asked.run()?;
     for (number, outcome) in (1..).zip(outcomes) {
         let within = match outcomes.len() {
             1 => String::new(),
@@ -190,17 +194,14 @@ fn files(asked: &Asked, words: &Words, outcomes: &[Outcome]) -> Answer<Written> 
     if let Some(settings) = asked.settings_file()? {
         all.insert(SETTINGS_FILE.to_owned(), settings.into_bytes());
     }
-    all.insert(
-        "command.txt".to_owned(),
-        command(asked, words)?.into_bytes(),
-    );
+    all.insert("command.txt".to_owned(), command(asked)?.into_bytes());
     Ok(all)
 }
 
 /// The command that asks the same.
-pub(crate) fn command(asked: &Asked, words: &Words) -> Answer<String> {
+pub(crate) fn command(asked: &Asked) -> Answer<String> {
     let mut all = vec!["moiregauge".to_owned()];
-    all.extend(asked.arguments(words)?);
+    all.extend(asked.arguments()?);
     all.extend(["--out".to_owned(), "results".to_owned()]);
     Ok(format!("{}\n", quoted(&all)))
 }

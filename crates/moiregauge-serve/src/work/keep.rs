@@ -1,8 +1,9 @@
 //! Works on the disk, if the user named a folder for them: whole or as before, whatever ends the server.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use moiregauge_pipeline::campaign::Kept;
+use moiregauge_pipeline::campaign::{Heard, Kept};
 use serde::{Deserialize, Serialize};
 
 use super::asked::Asked;
@@ -11,6 +12,8 @@ use crate::host::put;
 
 /// What says which other files count; it is written last.
 const WORK: &str = "work.json";
+/// How names of files begin that hold one measured scan each.
+const BEGUN: &str = "begun-";
 
 /// A work as it is kept.
 #[derive(Debug, Serialize, Deserialize)]
@@ -50,7 +53,7 @@ impl Keeper {
             let work: OnDisk =
                 serde_json::from_slice(&std::fs::read(folder.join(WORK)).ok()?).ok()?;
             let Some(results) = &work.results else {
-                return Some((id, work, Vec::new(), Kept::default()));
+                return Some((id, work, Vec::new(), begun(&folder)));
             };
             let names = (1..=results.moires).map(|n| document(results.version, n));
             let documents = names.map(|name| std::fs::read(folder.join(name)).ok());
@@ -58,9 +61,21 @@ impl Keeper {
             let measured = std::fs::read(folder.join(measured_of(results.version))).ok();
             // What cannot be understood is measured again.
             let measured = measured.and_then(|bytes| serde_json::from_slice(&bytes).ok());
-            Some((id, work, documents, measured.unwrap_or_default()))
+            let mut measured: Kept = measured.unwrap_or_default();
+            measured.extend(begun(&folder));
+            Some((id, work, documents, measured))
         };
         folders.filter_map(|entry| one(entry.path())).collect()
+    }
+
+    /// Keeps each file of a work as soon as it is measured, for what ends the run before there is a result. What cannot be
+    /// written is measured again.
+    pub(super) fn each(&self, id: &str) -> Heard {
+        let folder = self.0.join(id);
+        Arc::new(move |key, measured| {
+            let bytes = serde_json::to_vec(&measured).ok();
+            bytes.and_then(|bytes| put(&folder, &format!("{BEGUN}{key}.json"), &bytes).ok());
+        })
     }
 
     /// Writes a work. Results have names of their own for each version, so that what was kept before counts until all of
@@ -95,14 +110,31 @@ fn measured_of(version: u64) -> String {
     format!("measured-{version}.json")
 }
 
-/// Removes results of other versions; what cannot be removed does no harm.
+/// What a run had measured that came to no end.
+fn begun(folder: &Path) -> Kept {
+    let mut all = Kept::default();
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let is_begun = entry.file_name().to_string_lossy().starts_with(BEGUN);
+        let bytes = is_begun.then(|| std::fs::read(entry.path()).ok()).flatten();
+        if let Some(kept) = bytes.and_then(|bytes| serde_json::from_slice(&bytes).ok()) {
+            all.extend(kept);
+        }
+    }
+    all
+}
+
+/// Removes results of other versions, and what led to this one; what cannot be removed does no harm.
 fn forget(folder: &Path, results: &Results) {
     let documents = (1..=results.moires).map(|n| document(results.version, n));
     let mut own: Vec<String> = documents.collect();
     own.push(measured_of(results.version));
     for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();
-        let is_result = |name: &str| name.starts_with("results-") || name.starts_with("measured-");
+        let is_result = |name: &str| {
+            ["results-", "measured-", BEGUN]
+                .iter()
+                .any(|kind| name.starts_with(kind))
+        };
         if let Some(name) = name.to_str()
             && is_result(name)
             && !own.iter().any(|one| one == name)

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex};
 
-use moiregauge_pipeline::campaign::{Campaign, Kept};
+use moiregauge_pipeline::campaign::{Advice, Campaign, Kept};
 use moiregauge_pipeline::maps::{MapFound, MapRequest, NotMapped, Shown};
 use moiregauge_pipeline::sink::{Forget, MemorySink};
 use moiregauge_pipeline::{Cancel, Found, Job, Known, record_files};
@@ -17,9 +17,9 @@ use super::table::Table;
 use super::task::{NoResult, Progress, run_beside};
 use crate::host::{Hub, begin};
 use crate::lock::lock;
-use crate::options::Words;
 use crate::problem::{Answer, Problem};
 use crate::roots::places;
+use crate::typed::map_as_options;
 
 /// Maps at a time: each holds all its quantities.
 const MOST: usize = 20;
@@ -28,7 +28,7 @@ const MOST: usize = 20;
 #[derive(Debug)]
 pub(crate) struct Maps {
     hub: Arc<Hub>,
-    words: Words,
+    advice: Advice,
     all: Table<MapWork>,
 }
 
@@ -63,10 +63,10 @@ pub(crate) struct Mapped {
 }
 
 impl Maps {
-    pub(crate) fn new(hub: &Arc<Hub>, words: Words) -> Self {
+    pub(crate) fn new(hub: &Arc<Hub>, advice: Advice) -> Self {
         Self {
             hub: Arc::clone(hub),
-            words,
+            advice,
             all: Table::new('m', "map"),
         }
     }
@@ -104,9 +104,9 @@ impl Maps {
                 found: None,
             }),
         })?;
-        let (made, words) = (Arc::clone(&map), self.words);
+        let (made, advice) = (Arc::clone(&map), self.advice);
         let progress = Progress::new(&self.hub, "map", &map.id);
-        begin(move || made.make(&words, kept, &progress)).map_err(Problem::fault)?;
+        begin(move || made.make(advice, kept, &progress)).map_err(Problem::fault)?;
         Ok(map)
     }
 
@@ -161,9 +161,11 @@ impl MapWork {
         found.ok_or_else(|| Problem::conflict("there is no map yet"))
     }
 
-    fn make(&self, words: &Words, kept: Kept, progress: &Progress) {
+    fn make(&self, advice: Advice, kept: Kept, progress: &Progress) {
         progress.state("running");
-        let made = run_beside(&self.cancel, progress, |job| self.mapping(words, kept, job));
+        let made = run_beside(&self.cancel, progress, |job| {
+            self.mapping(advice, kept, job)
+        });
         let mut inner = lock(&self.inner);
         match made {
             Ok(mapped) => (inner.state, inner.found) = ("done", Some(Arc::new(mapped))),
@@ -183,7 +185,7 @@ impl MapWork {
 
     fn mapping(
         &self,
-        words: &Words,
+        advice: Advice,
         kept: Kept,
         job: &Job,
     ) -> Result<Mapped, (String, Vec<FailedInput>)> {
@@ -196,17 +198,17 @@ impl MapWork {
             ..Found::default()
         };
         let (inputs, left_out) = named.frames();
-        let mut arguments = self.asked.arguments(words).map_err(of_problem)?;
+        let mut arguments = self.asked.arguments().map_err(of_problem)?;
         "map".clone_into(&mut arguments[0]);
-        arguments.extend((words.map)(&self.request));
+        arguments.extend(map_as_options(&self.request));
         let mut run = Run {
             command: "map".to_owned(),
             arguments,
             left_out,
-            ..self.asked.run(words).map_err(of_problem)?
+            ..self.asked.run().map_err(of_problem)?
         };
         let places = places(&self.asked.files);
-        let campaign = Campaign::of_run(&run, &inputs, &places, words.advice);
+        let campaign = Campaign::of_run(&run, &inputs, &places, advice);
         let mut campaign = campaign.map_err(|e| of_error(&e))?.illustrated(false);
         campaign.take(kept);
         let found = moiregauge_pipeline::map(&mut campaign, &self.request, &Forget, job);

@@ -2,17 +2,17 @@
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
+use moiregauge_pipeline::campaign::Advice;
 use moiregauge_pipeline::watch::{Watch, WatchRequest};
 use moiregauge_pipeline::{Cancel, Job, Quiet};
 use serde_json::{Value, json};
 
 use super::table::Table;
 use crate::feed::Feed;
-use crate::host::{Hub, WATCHES_FOLDERS, begin};
+use crate::host::{Hub, repeat};
 use crate::lock::lock;
-use crate::options::Words;
 use crate::problem::{Answer, Problem};
 
 /// Lines that are kept for pages that come later.
@@ -34,14 +34,12 @@ const NUMBERS: [&str; 10] = [
 ];
 /// Between two looks into the folder.
 const POLL: Duration = Duration::from_secs(2);
-/// Between two looks whether the watch is to stop.
-const STEP: Duration = Duration::from_millis(100);
 
 /// All watches.
 #[derive(Debug)]
 pub(crate) struct Watches {
     hub: Arc<Hub>,
-    words: Words,
+    advice: Advice,
     all: Table<Watched>,
 }
 
@@ -65,10 +63,10 @@ struct Inner {
 }
 
 impl Watches {
-    pub(crate) fn new(hub: &Arc<Hub>, words: Words) -> Self {
+    pub(crate) fn new(hub: &Arc<Hub>, advice: Advice) -> Self {
         Self {
             hub: Arc::clone(hub),
-            words,
+            advice,
             all: Table::new('x', "watch"),
         }
     }
@@ -99,25 +97,21 @@ impl Watches {
 
     /// Begins one.
     pub(crate) fn add(&self, request: WatchRequest) -> Answer<Arc<Watched>> {
-        if !WATCHES_FOLDERS {
-            let words =
-                "this page cannot watch a folder: moiregauge watch does, and moiregauge serve";
-            return Err(Problem::conflict(words));
-        }
         let folder = request.folder.clone();
         let watch = Watch::new(request).map_err(Problem::wrong)?;
-        let mut watch = watch.with_advice(self.words.advice);
+        let mut watch = watch.with_advice(self.advice);
         let watched = self.insert(&folder)?;
         let of_thread = Arc::clone(&watched);
-        let thread = begin(move || {
-            let driven = std::panic::AssertUnwindSafe(|| of_thread.drive(&mut watch));
-            if std::panic::catch_unwind(driven).is_err() {
+        let job = Job::new(None, watched.cancel.clone(), &Quiet).map_err(Problem::fault)?;
+        let driven = repeat(POLL, watched.cancel.clone(), move || {
+            let look = std::panic::AssertUnwindSafe(|| of_thread.look(&mut watch, &job));
+            std::panic::catch_unwind(look).unwrap_or_else(|_| {
                 lock(&of_thread.inner).error =
                     Some("a fault of moiregauge, please report it".to_owned());
-                of_thread.ended("failed");
-            }
+                of_thread.ended("failed")
+            })
         });
-        thread.map_err(Problem::fault)?;
+        driven.map_err(Problem::fault)?;
         Ok(watched)
     }
 
@@ -185,33 +179,25 @@ impl Watched {
         self.hub.tell("watch", &event);
     }
 
-    fn ended(&self, state: &'static str) {
+    /// Tells how it ended; there is no more to do.
+    fn ended(&self, state: &'static str) -> bool {
         lock(&self.inner).state = state;
         let event = json!({"watch": self.id, "state": state});
         self.hub.tell("watch", &event);
+        false
     }
 
-    fn drive(&self, watch: &mut Watch) {
-        let Ok(job) = Job::new(None, self.cancel.clone(), &Quiet) else {
-            return self.ended("failed");
+    /// Looks into the folder; whether it is to be looked into again.
+    fn look(&self, watch: &mut Watch, job: &Job) -> bool {
+        let Ok(lines) = watch.look(job) else {
+            return self.ended("cancelled");
         };
-        loop {
-            let begun = Instant::now();
-            let Ok(lines) = watch.look(&job) else {
-                return self.ended("cancelled");
-            };
-            for line in lines {
-                self.tell(&serde_json::to_value(line).unwrap_or_default());
-            }
-            if watch.is_reached() {
-                return self.ended("done");
-            }
-            while begun.elapsed() < POLL {
-                if self.cancel.is_cancelled() {
-                    return self.ended("cancelled");
-                }
-                std::thread::sleep(STEP);
-            }
+        for line in lines {
+            self.tell(&serde_json::to_value(line).unwrap_or_default());
         }
+        if watch.is_reached() {
+            return self.ended("done");
+        }
+        true
     }
 }

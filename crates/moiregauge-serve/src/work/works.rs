@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex};
 
 use moiregauge_pipeline::Cancel;
-use moiregauge_pipeline::campaign::{Kept, Outcome};
+use moiregauge_pipeline::campaign::{Advice, Kept, Outcome};
 use moiregauge_report::FailedInput;
 use serde_json::{Value, json};
 
@@ -16,7 +16,6 @@ use super::table::Table;
 use super::task::{NoResult, Progress, run_beside};
 use crate::host::{Hub, Running, SAVES, begin, ended};
 use crate::lock::lock;
-use crate::options::Words;
 use crate::problem::{Answer, Problem};
 use crate::roots::Roots;
 
@@ -27,7 +26,7 @@ const MOST: usize = 500;
 #[derive(Debug)]
 pub(crate) struct Works {
     hub: Arc<Hub>,
-    words: Words,
+    advice: Advice,
     keeper: Option<Keeper>,
     all: Table<Work>,
 }
@@ -37,7 +36,7 @@ pub(crate) struct Works {
 pub(crate) struct Work {
     pub(crate) id: String,
     hub: Arc<Hub>,
-    words: Words,
+    advice: Advice,
     keeper: Option<Keeper>,
     inner: Mutex<Inner>,
 }
@@ -73,10 +72,10 @@ struct Inner {
 
 impl Works {
     /// Those of an earlier server among them.
-    pub(crate) fn new(hub: &Arc<Hub>, words: Words, keep: Option<&Path>, roots: &Roots) -> Self {
+    pub(crate) fn new(hub: &Arc<Hub>, advice: Advice, keep: Option<&Path>, roots: &Roots) -> Self {
         let works = Self {
             hub: Arc::clone(hub),
-            words,
+            advice,
             keeper: keep.map(Keeper::new),
             all: Table::new('w', "work"),
         };
@@ -109,7 +108,7 @@ impl Works {
         Work {
             id,
             hub: Arc::clone(&self.hub),
-            words: self.words,
+            advice: self.advice,
             keeper: self.keeper.clone(),
             inner: Mutex::new(inner),
         }
@@ -209,7 +208,7 @@ impl Work {
     /// The moirés that came out last, the largest cell first.
     pub(crate) fn outcomes(&self) -> Answer<(Arc<Done>, Arc<Vec<Outcome>>)> {
         let (done, kept) = self.done()?;
-        let outcomes = done.outcomes(&self.words, &kept)?;
+        let outcomes = done.outcomes(self.advice, &kept)?;
         Ok((done, outcomes))
     }
 
@@ -306,8 +305,9 @@ impl Work {
             )
         };
         let progress = Progress::new(&self.hub, "work", &self.id);
+        let heard = self.keeper.as_ref().map(|keeper| keeper.each(&self.id));
         let found = run_beside(&cancel, &progress, |job| {
-            Done::of(&asked, &self.words, &mut kept, job)
+            Done::of(&asked, self.advice, &mut kept, heard, job)
         });
         let mut inner = lock(&self.inner);
         // Nothing that was measured is lost by a panic.

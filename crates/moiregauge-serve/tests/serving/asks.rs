@@ -178,3 +178,61 @@ fn profiles_of_maps_are_answered() {
     }
     assert!(good > 3, "{line}");
 }
+
+/// The samples below a folder become the table of a campaign, which lies with what was dropped; the folder stays as it is.
+#[test]
+fn samples_below_a_folder_are_analysed() {
+    let folder = tempfile::tempdir().unwrap();
+    for sample in ["a", "b"] {
+        let here = folder.path().join("all").join(sample);
+        std::fs::create_dir_all(&here).unwrap();
+        scans(&here, 1);
+    }
+    let server = Server::start(options(&[folder.path()]));
+    let wanted = json!({"root": "0", "under": "all", "settings": {"seed": 7}});
+    let campaign = server.post("/api/campaigns", &wanted).good();
+    let path = format!("/api/campaigns/{}", campaign["campaign"].as_str().unwrap());
+    let done = server.wait(&path);
+    assert_eq!(
+        (&done["state"], &done["failed"]),
+        (&json!("done"), &json!(0))
+    );
+    let of = |done: &serde_json::Value| {
+        format!(
+            "root={}&under={}",
+            done["root"].as_str().unwrap(),
+            done["under"].as_str().unwrap()
+        )
+    };
+    let table = server.get(&format!("/api/samples?{}", of(&done))).good();
+    let names: Vec<_> = table["rows"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|row| row["sample"].clone())
+        .collect();
+    assert_eq!(names, ["a", "b"]);
+    let zip = server.get(&format!("/api/samples/archive.zip?{}", of(&done)));
+    assert_eq!(zip.status, 200);
+    let text = String::from_utf8_lossy(&zip.body);
+    assert!(
+        text.contains("samples.csv") && text.contains("campaign.html") && text.contains("parts/")
+    );
+    assert_eq!(
+        std::fs::read_dir(folder.path().join("all"))
+            .unwrap()
+            .count(),
+        2
+    );
+    for (wrong, status) in [
+        (json!({"root": "0", "under": "../x"}), 403),
+        (json!({"root": "0", "under": "none"}), 404),
+        (json!({"root": "dropped"}), 422),
+    ] {
+        assert_eq!(
+            server.post("/api/campaigns", &wrong).status,
+            status,
+            "{wrong}"
+        );
+    }
+}
