@@ -1,19 +1,24 @@
 // Unpacks this file and begins: styles, modules one after the other, the program.
 (async () => {
-  const signs = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz!#$%&()*+-;,=>?@^_`{|}~";
-  const value = new Uint8Array(128);
-  [...signs].forEach((sign, i) => (value[sign.charCodeAt(0)] = i));
+  // Eleven signs hold nine bytes: all that are printed, but for "<".
   const packed = (/** @type {string} */ id) => {
-    const text = /** @type {HTMLElement} */ (document.getElementById(id)).textContent ?? "";
-    const bytes = new Uint8Array(4 * Math.ceil(text.length / 5));
-    const view = new DataView(bytes.buffer);
-    for (let at = 0; at < text.length; at += 5) {
-      let number = 0;
-      // What is missing at the end counts as the last sign.
-      for (let i = at; i < at + 5; i++) number = 85 * number + (i < text.length ? value[text.charCodeAt(i)] : 84);
-      view.setUint32((at / 5) * 4, number);
+    const element = /** @type {HTMLElement} */ (document.getElementById(id));
+    const text = element.textContent ?? "";
+    const bytes = new Uint8Array((text.length / 11) * 9);
+    for (let at = 0, to = 0; at < text.length; at += 11) {
+      // A number of 72 bits, in three parts.
+      let high = 0, middle = 0, low = 0;
+      for (let i = at; i < at + 11; i++) {
+        const sign = text.charCodeAt(i);
+        low = low * 94 + sign - (sign > 60 ? 33 : 32);
+        middle = middle * 94 + (low >>> 24);
+        high = high * 94 + (middle >>> 24);
+        low &= 0xffffff;
+        middle &= 0xffffff;
+      }
+      for (const part of [high, middle, low]) for (const shift of [16, 8, 0]) bytes[to++] = part >>> shift;
     }
-    return bytes.subarray(0, Math.floor((text.length * 4) / 5));
+    return bytes.subarray(0, Number(element.dataset.bytes));
   };
   const unpacked = (/** @type {string} */ id) =>
     new Response(new Blob([packed(id)]).stream().pipeThrough(new DecompressionStream("gzip")));

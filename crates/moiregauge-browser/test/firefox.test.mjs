@@ -50,7 +50,7 @@ test("in Firefox: numbers, a map, a correction by hand, a zip; what is no scan i
   const [text, broken] = [join(WORK, "firefox-notes.txt"), join(WORK, "firefox-broken.spm")];
   writeFileSync(text, "A day at the microscope.\n");
   writeFileSync(broken, readFileSync(files[0]).subarray(0, 9000));
-  await page.drop([text, broken, ...files]);
+  await page.drop([...files, text, broken]);
   await page.analyse();
   const before = await page.results();
   same(before, byProgram(files, "firefox"));
