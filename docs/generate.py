@@ -214,7 +214,7 @@ OFTEN = """## Where to find the usual numbers
 | moiré vectors, free of drift | `sets[0].mean.vectors` |
 | all sets together | `combined.twist_deg` |
 | where the uncertainty comes from | `sets[0].mean.budget` |
-| every reading of the lattice | `sets[0].mean.readings.solutions` |
+| every solution of the lattice | `sets[0].mean.readings.solutions` |
 | single scans, before and after the drift is removed | `sets[0].scans[0].twist_strain.sensor`, `sets[0].scans[0].twist_strain.drift_corrected` |
 | caveats | `caveats[0].code` |
 | which files, which settings, which version | `provenance`, `settings` |

@@ -23,5 +23,5 @@ for ax, layers in zip(axes, ("graphene", "graphene/hBN")):
         found.append(back["twist_strain"]["twist_deg"]["value"])
     ax.plot(strains, np.array(found) - 1.1, "o-", color=mg.UP)
     ax.axhline(0, color=mg.LINE, lw=0.8)
-    ax.set(title=layers, xlabel="true isotropic strain (%)", ylabel="reading − true twist (°)")
+    ax.set(title=layers, xlabel="true isotropic strain (%)", ylabel="twist found − true twist (°)")
 plt.show()

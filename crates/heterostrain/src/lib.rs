@@ -37,7 +37,7 @@
 //! | --- | --- |
 //! | [`lattice`] | two vectors with their covariance, real and reciprocal; names of vectors; the cell |
 //! | [`material`] | atomic layers and pairs of them |
-//! | [`strain`] | twist and strain of a moiré, all its readings, the whole tensor where an orientation is known |
+//! | [`strain`] | twist and strain of a moiré, all its solutions, the whole tensor where an orientation is known |
 
 mod complex_pair;
 mod estimate;

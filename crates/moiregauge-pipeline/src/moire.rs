@@ -338,7 +338,7 @@ impl Moire {
     }
 }
 
-/// All readings of a lattice whose covariance is all that is not known of it.
+/// All solutions of a lattice whose covariance is all that is not known of it.
 fn read(lattice: &Lattice, settings: &Settings) -> Result<(TwistStrain, Readings), StrainError> {
     let found = twist_strain(lattice, settings.bilayer(), settings.strain_convention)?;
     let statistical = Statistical {

@@ -23,9 +23,9 @@ pub struct MoireDocument {
     pub input: String,
     /// The moiré cell.
     pub cell: CellResult,
-    /// The default reading of the moiré: θ > 0 and ε ≥ 0, no isotropic strain; `null` where nothing was asked.
+    /// The default solution of the moiré: θ > 0 and ε ≥ 0, no isotropic strain; `null` where nothing was asked.
     pub twist_strain: Option<TwistStrainResult>,
-    /// All readings.
+    /// All solutions.
     pub readings: Option<ReadingsResult>,
     /// What the numbers mean.
     pub conventions: Conventions,

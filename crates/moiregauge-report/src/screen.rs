@@ -217,7 +217,7 @@ fn twist_strain(text: &mut String, found: &TwistStrain, budget: &Budget, reading
         } else if readings.tensor.is_some() {
             ", without isotropic strain"
         } else if readings.layers_differ {
-            ", one reading of several"
+            ", one solution of several"
         } else {
             ""
         }
@@ -314,7 +314,7 @@ fn strain_tensor(
     }
 }
 
-/// What else the lattice can mean: all readings of different layers, or the strain tensor.
+/// What else the lattice can mean: all solutions of different layers, or the strain tensor.
 fn readings(text: &mut String, readings: &Readings) {
     let degrees = |e: Estimate| plus_minus(e.scaled(1f64.to_degrees()));
     let percent = |e: Estimate| plus_minus(e.scaled(100.0));
@@ -330,7 +330,7 @@ fn readings(text: &mut String, readings: &Readings) {
             }
             Some(opposite) => {
                 text.push_str(
-                    "  with the orientation of a layer; the sense of the twist is open, and both readings fit equally \
+                    "  with the orientation of a layer; the sense of the twist is open, and both solutions fit equally \
                      well:\n",
                 );
                 strain_tensor(text, "either ", &tensor.best, &tensor.in_all(), ratio);

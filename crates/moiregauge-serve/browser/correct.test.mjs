@@ -185,7 +185,7 @@ test("a stroke is painted while the result of the one before comes, and both cou
   await page.leave();
 });
 
-test("another reading of the lattice is chosen and dropped", async () => {
+test("another solution of the lattice is chosen and dropped", async () => {
   await server.stop();
   server = await serve([rootWith("strained", simulated("strained", ["--scans", "2", "--pixels", "192", "--size", "200", "200", "--twist", "0.5", "--strain", "0.9"]))]);
   const page = await open(server.url);
@@ -194,12 +194,12 @@ test("another reading of the lattice is chosen and dropped", async () => {
   await page.waitForSelector("html[data-correct]");
   const numbers = page.locator("#view-correct .headline").first();
   const before = await numbers.innerText();
-  await page.getByText(/readings of this lattice/).click();
-  await nextResult(page, () => page.getByRole("button", { name: /^Use the reading with twist/ }).first().click());
+  await page.getByText(/solutions of this lattice/).click();
+  await nextResult(page, () => page.getByRole("button", { name: /^Use the solution with twist/ }).first().click());
   assert.equal((await settings(page)).moire_waves.length, 2);
   await page.waitForFunction((text) => /** @type {HTMLElement | null} */ (document.querySelector("#view-correct .headline"))?.innerText !== text, before);
-  if (process.env.SCREENSHOTS) await page.screenshot({ path: `${process.env.SCREENSHOTS}/reading.png` });
-  await nextResult(page, () => page.getByRole("button", { name: "Drop: Reading chosen" }).click());
+  if (process.env.SCREENSHOTS) await page.screenshot({ path: `${process.env.SCREENSHOTS}/solution.png` });
+  await nextResult(page, () => page.getByRole("button", { name: "Drop: Solution chosen" }).click());
   assert.equal((await settings(page)).moire_waves, undefined);
   assert.deepEqual(page.wrong, []);
   await page.leave();

@@ -1,4 +1,4 @@
-// What a person may choose in place of the program: another reading of the lattice, another grain of the frame.
+// What a person may choose in place of the program: another solution of the lattice, another grain of the frame.
 
 import { h, scroll, table } from "./dom.js";
 import { number } from "./format.js";
@@ -15,9 +15,9 @@ export function readingList(names, use) {
   if (names.length < 2) return null;
   const rows = names.map((name, n) => [
     `${number(name.twist_deg, 4)}`, `${number(name.strain_percent, 3)}`, STANDINGS[name.standing] ?? name.standing,
-    n === 0 ? "" : h("button", { type: "button", class: "link", text: "Use", "aria-label": `Use the reading with twist ${number(name.twist_deg, 4)}° and strain ${number(name.strain_percent, 3)} %`, onclick: () => use(name.moire_waves) })]);
-  return h("details", { class: "readings" }, h("summary", { text: `${names.length} readings of this lattice` }),
-    scroll("Readings", table("Twist and strain by which of its waves belong to the atoms", ["Twist (°)", "Strain (%)", "Standing", ""], rows, { numbers: [0, 1], shown: true })));
+    n === 0 ? "" : h("button", { type: "button", class: "link", text: "Use", "aria-label": `Use the solution with twist ${number(name.twist_deg, 4)}° and strain ${number(name.strain_percent, 3)} %`, onclick: () => use(name.moire_waves) })]);
+  return h("details", { class: "readings" }, h("summary", { text: `${names.length} solutions of this lattice` }),
+    scroll("Solutions", table("Twist and strain by which of its waves belong to the atoms", ["Twist (°)", "Strain (%)", "Standing", ""], rows, { numbers: [0, 1], shown: true })));
 }
 
 /**

@@ -165,7 +165,7 @@ export class CorrectView {
     if (this.picked && !this.wait) this.load(true);
   }
 
-  /** Other readings of the lattice, and other grains of the scan. */
+  /** Other solutions of the lattice, and other grains of the scan. */
   async showChoices() {
     const [file, version] = [this.picked, work.version];
     const names = work.id ? await get(`works/${work.id}/names${work.moire > 1 ? query({ moire: work.moire }) : ""}`).catch(() => []) : [];
@@ -179,7 +179,7 @@ export class CorrectView {
 
   /** @param {number[][] | null} waves */
   chooseReading(waves) {
-    say(waves ? "Reading chosen" : "Reading left to the program");
+    say(waves ? "Solution chosen" : "Solution left to the program");
     this.choose("moire_waves", waves);
   }
 

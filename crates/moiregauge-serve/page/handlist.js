@@ -26,7 +26,7 @@ export function byHandList(is, tell, exclude, anyReading, allGrains) {
   regions.forEach((/** @type {any[]} */ ring, /** @type {number} */ i) =>
     rows.push(row(`Region ${i + 1}, ${ring.length} corners`, "Remove", () => tell({ regions_nm: regions.filter((/** @type {any} */ _, /** @type {number} */ k) => k !== i) }, `Region ${i + 1} removed`))));
   if (hand.mask) rows.push(row(`Mask, ${number(100 * leftOut(hand.mask), 2)} % left out`, "Remove", () => tell({ mask: null }, "Mask removed")));
-  if (is.settings?.moire_waves) rows.push(row("Reading chosen", "Drop", anyReading));
+  if (is.settings?.moire_waves) rows.push(row("Solution chosen", "Drop", anyReading));
   if (is.settings?.grain) rows.push(row(`Grain ${is.settings.grain} alone`, "Use all", allGrains));
   for (const file of is.excluded) rows.push(row(`${store.name(file)} left out`, "Use again", () => exclude(is.excluded.filter((f) => f !== file))));
   return rows.length > 0 ? rows : [h("li", { class: "hint", text: "Nothing." })];

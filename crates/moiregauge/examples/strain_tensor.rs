@@ -12,7 +12,7 @@ use moiregauge::caveat::Caveat;
 use rayon::prelude::*;
 use tensor_scene::{moire, on_hbn, run, truth};
 
-/// Pulls and errors of one set, whether it has more than one reading, and whether its atomic images scatter.
+/// Pulls and errors of one set, whether it has more than one solution, and whether its atomic images scatter.
 type Outcome = ([f64; 7], [f64; 7], [bool; 2]);
 
 fn main() {

@@ -39,7 +39,7 @@
 //! | | [`campaign`] | all scans together: sets, drift, joint result, orientation of a layer, calibration runs |
 //! | | [`plan`] | errors before anything is measured |
 //! | | [`scan`] | one scan → a few numbers; where its pixels were, and when |
-//! | | [`meaning`] | what a lattice means: uncertainty budget, other readings, names |
+//! | | [`meaning`] | what a lattice means: uncertainty budget, other solutions, names |
 //! | | [`domains`] | nodes and triangles at small angles |
 //! | | [`region`], [`stripes`] | questions to finished maps; maps of one wave |
 //! | | [`map`] | maps of the local lattice |

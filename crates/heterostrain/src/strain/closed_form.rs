@@ -25,10 +25,10 @@ use crate::strain::twist_strain::TwistStrain;
 /// Above this |q|/|p| the mirrored labelling (strain makes the moiré, twist distorts it) is listed. Half and twice as
 /// much change no result of docs/constants.md.
 const MIRRORED_FROM: f64 = 0.3;
-/// Readings of layers of different, dissimilar lattices that need more strain are not listed: three times the per
+/// Solutions of layers of different, dissimilar lattices that need more strain are not listed: three times the per
 /// cent that layers rarely reach.
 const LIKELY_STRAIN: f64 = 0.03;
-/// Readings of such layers that are listed for either sense of the twist, the least strained ones: what a table can
+/// Solutions of such layers that are listed for either sense of the twist, the least strained ones: what a table can
 /// show.
 const LISTED: usize = 12;
 
@@ -208,7 +208,7 @@ fn branches_by_trial(lattice: &Lattice, layers: &Layers) -> Result<Solutions, St
                 let between = (a - b).rem_euclid(period);
                 between.min(period - between)
             };
-            // Readings of one twist and strain may differ in their orientation.
+            // Solutions of one twist and strain may differ in their orientation.
             let same = |b: &Branch| {
                 (b.twist - branch.twist).abs() + (b.strain - branch.strain).abs() < 1e-9
                     && apart(b.lattice_angle, branch.lattice_angle, layers.period) < 1e-6

@@ -15,7 +15,7 @@ use crate::lattice::vectors::Lattice;
 use crate::strain::labelling::moire_matrix;
 use crate::strain::layers::Layers;
 
-/// Readings that need more strain are not listed: strains between layers are a few tenths of a per cent, rarely one.
+/// Solutions that need more strain are not listed: strains between layers are a few tenths of a per cent, rarely one.
 /// See docs/constants.md.
 const LARGEST_STRAIN: f64 = 0.01;
 /// Wave vectors that are tried, at most, for the time's sake; the bound is lowered for lattices with more.

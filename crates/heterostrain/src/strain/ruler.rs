@@ -76,7 +76,7 @@ impl Ruler {
         found
     }
 
-    /// Twist and strain of a moiré in nm of the ruler, which is layer 1 of `bilayer` or layer 2: every reading, as
+    /// Twist and strain of a moiré in nm of the ruler, which is layer 1 of `bilayer` or layer 2: every solution, as
     /// [`strain_tensors`] has them, with the covariance of the lattice.
     ///
     /// # Errors

@@ -9,7 +9,7 @@
 //! Without an orientation P leaves a circle of solutions, `|κ(1+η) e^{iθ} − 1| = |p|`; with it
 //! `σ_η = θ σ_α` for equal layers. What is left open: orientations are known modulo the symmetry of the layer. For equal
 //! layers (θ, η) and about (−θ, −η) go with one orientation modulo 60°; that with θ > 0 comes first. For different
-//! layers the reading with the least mean strain is the best, and its sign is that of the twist.
+//! layers the solution with the least mean strain is the best, and its sign is that of the twist.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -29,7 +29,7 @@ use crate::strain::layers::Layers;
 use crate::strain::names::{Labelled, change_to};
 use crate::strain::vector::StrainVector;
 
-/// Readings with more mean strain than this are no alternatives: layers on each other stay far below one per cent.
+/// Solutions with more mean strain than this are no alternatives: layers on each other stay far below one per cent.
 const LARGEST_MEAN_STRAIN: f64 = 0.01;
 
 /// The orientation of one layer.
@@ -90,16 +90,16 @@ pub struct Split {
     pub axis_lab: Option<Estimate>,
 }
 
-/// Every reading of a moiré lattice for one orientation, the best one first: see the module.
+/// Every solution of a moiré lattice for one orientation, the best one first: see the module.
 ///
-/// With [`Bilayer::waves`] these are the readings of that name of the lattice. Without, they are for layers of different shapes those of
+/// With [`Bilayer::waves`] these are the solutions of that name of the lattice. Without, they are for layers of different shapes those of
 /// all names near the shortest pair, and for layers of one shape those of the least strained one, which strain can make another than that of the atoms (from 0.46 of the twist on for hexagonal layers,
 /// from 0.23 for the 1T′ phase of `WTe₂`).
 ///
 /// The covariance holds that of the lattice and of the orientation, taken as independent.
 ///
 /// # Errors
-/// As [`crate::strain::twist_strain`]; [`StrainError::NoMoire`] where the orientation fits no reading.
+/// As [`crate::strain::twist_strain`]; [`StrainError::NoMoire`] where the orientation fits no solution.
 pub fn strain_tensors<'a>(
     lattice: &Lattice,
     bilayer: impl Into<Bilayer<'a>>,
@@ -170,7 +170,7 @@ fn names_to_try(lattice: &Lattice, layers: &Layers) -> Result<Vec<Labelled>, Str
     Ok(names.into_iter().filter_map(labelled).collect())
 }
 
-/// The reading for one orientation, taken as it is.
+/// The solution for one orientation, taken as it is.
 fn tensor(labelled: &Labelled, layers: &Layers, orientation: &Orientation) -> Option<StrainTensor> {
     let moire = ComplexPair::from(labelled.moire);
     let alpha = if orientation.of_reference {

@@ -73,7 +73,7 @@ fn bilayer(pair: &[Material; 2]) -> Bilayer<'_> {
     }
 }
 
-/// Who names the waves of layers of different shapes has the readings of that name and no others.
+/// Who names the waves of layers of different shapes has the solutions of that name and no others.
 #[test]
 fn waves_that_are_given_name_layers_of_different_shapes() {
     let made = Stacking {
@@ -107,7 +107,7 @@ fn waves_that_are_given_name_layers_of_different_shapes() {
     assert_eq!(of(Some(Matrix2::new(1.0, 2.0, 2.0, 4.0))).len(), all.len());
 }
 
-/// Whether two readings are one, but for rounding.
+/// Whether two solutions are one, but for rounding.
 fn same(a: &StrainTensor, b: &StrainTensor) -> bool {
     (a.twist - b.twist).abs() < 1e-9 && (a.mean - b.mean).abs() < 1e-9
 }

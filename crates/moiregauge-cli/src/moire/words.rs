@@ -8,7 +8,7 @@ use heterostrain::strain::{Branch, StrainTensor};
 use moiregauge::meaning::Readings;
 use moiregauge_report::{CellResult, MoireDocument, fixed, plus_minus};
 
-/// Readings by other pairs of waves that are printed.
+/// Solutions by other pairs of waves that are printed.
 const SHOWN: usize = 8;
 
 /// The cell, and what it means.
@@ -73,13 +73,13 @@ fn meaning(text: &mut String, document: &MoireDocument, readings: &Readings, axe
     let degree = 1f64.to_degrees();
     let _ = writeln!(
         text,
-        "\nreadings with uniaxial strain alone (axis counted from {axes}):"
+        "\nsolutions with uniaxial strain alone (axis counted from {axes}):"
     );
     if readings.solutions.is_empty() {
         let sigma = document.twist_strain.and_then(|t| t.twist_deg.sigma);
         let _ = writeln!(
             text,
-            "  none: the moiré is larger than any twist can make it; the nearest reading is aligned layers, twist 0 ± \
+            "  none: the moiré is larger than any twist can make it; the nearest solution is aligned layers, twist 0 ± \
              {:.3}°",
             sigma.unwrap_or(f64::INFINITY)
         );
@@ -96,7 +96,7 @@ fn meaning(text: &mut String, document: &MoireDocument, readings: &Readings, axe
     if !others.is_empty() {
         let _ = writeln!(
             text,
-            "other readings of the same lattice, by other pairs of its waves (θ > 0; --json lists all with up to {:.2} \
+            "other solutions of the same lattice, by other pairs of its waves (θ > 0; --json lists all with up to {:.2} \
              % of strain):",
             100.0 * readings.complete_to
         );

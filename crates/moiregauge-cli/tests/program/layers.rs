@@ -189,7 +189,7 @@ fn layers_of_a_file() {
     assert!(refused.stderr.contains("go together"), "{}", refused.stderr);
 }
 
-/// Graphene on hBN: two readings that differ at first order, one of them the truth, and a caveat; with atomic
+/// Graphene on hBN: two solutions that differ at first order, one of them the truth, and a caveat; with atomic
 /// images of the lower layer the whole tensor.
 #[test]
 fn graphene_on_boron_nitride() {

@@ -17,7 +17,7 @@ fn reported(found: &Value) -> ([f64; 2], String) {
     )
 }
 
-/// Whether a reading of the list is this one.
+/// Whether a solution of the list is this one.
 fn is_listed(found: &Value, [twist, strain]: [f64; 2]) -> bool {
     let solutions = &found["sets"][0]["mean"]["readings"]["solutions"];
     solutions.as_array().unwrap().iter().any(|s| {

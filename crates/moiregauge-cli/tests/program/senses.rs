@@ -12,7 +12,7 @@ const SAMPLE: [&str; 6] = [
 ];
 const SMALL: [&str; 4] = ["--pixels", "128", "--scans", "4"];
 
-/// −1.5° and 1.5° with the atoms of layer 1: both readings on the screen and in the results, the truth among them; the
+/// −1.5° and 1.5° with the atoms of layer 1: both solutions on the screen and in the results, the truth among them; the
 /// sense or the orientation of the other layer leaves it alone.
 #[test]
 fn either_sense_of_twisted_graphene() {

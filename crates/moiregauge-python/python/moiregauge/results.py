@@ -1025,7 +1025,7 @@ class NameResult(Document):
     strain_percent: float
     """The strain of its first solution with θ > 0."""
     twist_deg: float
-    """The twist of this reading."""
+    """The twist of this solution."""
     waves: tuple[tuple[int, int], tuple[int, int]]
     """As of the solutions."""
 
@@ -1054,7 +1054,7 @@ class NamesResult(Document):
 
 @dataclass(frozen=True, kw_only=True)
 class OtherSenseResult(Document):
-    """The reading for θ < 0 where the sense of the twist is open."""
+    """The solution for θ < 0 where the sense of the twist is open."""
 
     axis_lab_deg: Estimate | None
     """φ, in [0, 180); `null` unless γ is significant."""
@@ -1075,7 +1075,7 @@ class OtherSenseResult(Document):
     twist_deg: Estimate
     """Twist of layer 2 against layer 1."""
     twist_interval_deg: tuple[float | None, float | None]
-    """Range of the magnitude of the twist from both readings, with 1.96 σ of `total` on either side."""
+    """Range of the magnitude of the twist from both solutions, with 1.96 σ of `total` on either side."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -1689,7 +1689,7 @@ class StrainTensorResult(Document):
     """Twist and the whole strain of layer 2 against layer 1, of atoms, tension positive."""
 
     alternatives: tuple[TensorNumbers, ...]
-    """Other readings of the same orientation with less than 1 % of mean strain."""
+    """Other solutions of the same orientation with less than 1 % of mean strain."""
     axis_lab_deg: Estimate | None
     """φ, in [0, 180); `null` unless γ is significant."""
     covariance: tuple[tuple[float | None, float | None, float | None, float | None, float | None], tuple[float | None, float | None, float | None, float | None, float | None], tuple[float | None, float | None, float | None, float | None, float | None], tuple[float | None, float | None, float | None, float | None, float | None], tuple[float | None, float | None, float | None, float | None, float | None]]
@@ -1699,7 +1699,7 @@ class StrainTensorResult(Document):
     mean_strain_percent: Estimate
     """½(ε₁ + ε₂)."""
     other_sense: OtherSenseResult | None
-    """For two equal layers whose sense of twist is open: the reading for the other sense, which fits equally
+    """For two equal layers whose sense of twist is open: the solution for the other sense, which fits equally
     well; `null` otherwise.
     """
     shear_percent: Estimate

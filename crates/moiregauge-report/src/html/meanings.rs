@@ -6,11 +6,11 @@ use super::words::{plain, shown, statistical};
 use crate::draw::scale::fixed;
 use crate::results::{NamesResult, ReadingsResult, SolutionResult, SplitResult, TensorNumbers};
 
-/// The readings of a lattice.
+/// The solutions of a lattice.
 #[derive(Debug, Serialize)]
 pub(super) struct Meanings {
     differ: bool,
-    /// Why, what takes the place of the twist in the headline (the tensor's, or all readings), and its statistical
+    /// Why, what takes the place of the twist in the headline (the tensor's, or all solutions), and its statistical
     /// part.
     headline: Option<[String; 3]>,
     /// Twist, strain and axis of every solution that a user has to choose from.

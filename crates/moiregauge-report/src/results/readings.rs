@@ -70,7 +70,7 @@ pub struct NameResult {
     pub waves: [[i32; 2]; 2],
     /// The strain of its first solution with θ > 0.
     pub strain_percent: f64,
-    /// The twist of this reading.
+    /// The twist of this solution.
     pub twist_deg: f64,
     /// `reported`, `open` (as plausible as the reported one), `against-image`, `against-orientation` or `unlikely` (much
     /// strain).
@@ -110,18 +110,18 @@ pub struct StrainTensorResult {
     pub splits: [SplitResult; 2],
     /// Covariance of (twist, lattice angle, mean strain, shear₁, shear₂) in degrees and per cent.
     pub covariance: [[Option<f64>; 5]; 5],
-    /// For two equal layers whose sense of twist is open: the reading for the other sense, which fits equally well;
+    /// For two equal layers whose sense of twist is open: the solution for the other sense, which fits equally well;
     /// `null` otherwise.
     #[serde(default)]
     pub other_sense: Option<OtherSenseResult>,
-    /// Other readings of the same orientation with less than 1 % of mean strain.
+    /// Other solutions of the same orientation with less than 1 % of mean strain.
     pub alternatives: Vec<TensorNumbers>,
 }
 
-/// The reading for θ < 0 where the sense of the twist is open.
+/// The solution for θ < 0 where the sense of the twist is open.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct OtherSenseResult {
-    /// As of the reading with θ > 0.
+    /// As of the solution with θ > 0.
     #[serde(flatten)]
     pub found: TensorNumbers,
     /// σ of the same with calibration and lattice constants as well.
@@ -130,7 +130,7 @@ pub struct OtherSenseResult {
     pub splits: [SplitResult; 2],
     /// Covariance of (twist, lattice angle, mean strain, shear₁, shear₂) in degrees and per cent.
     pub covariance: [[Option<f64>; 5]; 5],
-    /// Range of the magnitude of the twist from both readings, with 1.96 σ of `total` on either side.
+    /// Range of the magnitude of the twist from both solutions, with 1.96 σ of `total` on either side.
     pub twist_interval_deg: [Option<f64>; 2],
 }
 

@@ -9,7 +9,7 @@ use crate::caveat::readings::degrees;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum OrientationDoubt {
-    /// The orientation goes with no reading.
+    /// The orientation goes with no solution.
     #[error(
         "the orientation of the layer was not used, since it fits no solution for this moiré. Check that it belongs to \
          a layer of this moiré and is given in laboratory axes"
@@ -72,7 +72,7 @@ pub enum OrientationDoubt {
         ))
     )]
     SenseOpen {
-        /// Both readings.
+        /// Both solutions.
         senses: [SenseNumbers; 2],
         /// From which twist to which, rad.
         magnitudes: Option<[f64; 2]>,

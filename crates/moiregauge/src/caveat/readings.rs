@@ -78,10 +78,10 @@ pub enum ReadingDoubt {
         open: Vec<NumbersOfName>,
         /// Whether the image chose among more.
         by_image: bool,
-        /// No reading up to this strain is missing.
+        /// No solution up to this strain is missing.
         complete_to: f64,
     },
-    /// The reading that is reported needs more strain than others.
+    /// The solution that is reported needs more strain than others.
     #[error(
         "the reported solution is not the one with the least strain: {reported} instead of {}. {} (wave vectors \
          ({:.4}, {:.4}) and ({:.4}, {:.4}) rad/nm)",
@@ -90,7 +90,7 @@ pub enum ReadingDoubt {
     NotTheLeastStrain {
         /// The two waves, rad/nm.
         waves: [[f64; 2]; 2],
-        /// Their reading.
+        /// Their solution.
         reported: NumbersOfName,
         /// Those with less strain.
         less: Vec<NumbersOfName>,

@@ -18,7 +18,7 @@ use crate::window::mask::Mask;
 use crate::window::types::WaveMap;
 
 impl LatticeMap {
-    /// Twist and strain of every node that has a lattice, with the orientation of the ruler, which is layer 1 or layer 2: the reading next
+    /// Twist and strain of every node that has a lattice, with the orientation of the ruler, which is layer 1 or layer 2: the solution next
     /// to the `twist` (rad) of the whole.
     pub fn twist_strain_by(
         &self,

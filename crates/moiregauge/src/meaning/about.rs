@@ -87,7 +87,7 @@ fn about_alignment(
     add: &mut impl FnMut(Doubt),
 ) {
     let twist = found.twist();
-    // σ of θ², which stays finite; in `aligned` readings σ_θ is its root.
+    // σ of θ², which stays finite; in `aligned` solutions σ_θ is its root.
     let square_sigma = if twist.value > 0.0 {
         2.0 * twist.value * twist.sigma
     } else {

@@ -19,7 +19,7 @@ use crate::meaning::strengths::WaveStrengths;
 use crate::meaning::tensor::{CLEARLY, known_orientation};
 use crate::settings::knobs::Settings;
 
-/// A reading with no more strain than this, or than twice that of the one reported, is plausible. Chosen by eye; see
+/// A solution with no more strain than this, or than twice that of the one reported, is plausible. Chosen by eye; see
 /// docs/constants.md.
 const PLAUSIBLE_STRAIN: f64 = 0.007;
 /// Amplitude over that of the others below which a wave is not of the first order. Chosen by eye; see
@@ -53,7 +53,7 @@ pub enum Standing {
 pub struct NameReading {
     /// Which waves.
     pub name: LatticeName,
-    /// The uniaxial strain (magnitude) of its default reading.
+    /// The uniaxial strain (magnitude) of its default solution.
     pub strain: f64,
     /// The twist that goes with it, rad.
     pub twist: f64,
@@ -78,7 +78,7 @@ impl Naming {
     }
 
     /// What is thought of the names of `found`, whose first is reported. `None` for layers of dissimilar lattices, whose
-    /// readings under all names are of equal rank anyway.
+    /// solutions under all names are of equal rank anyway.
     pub(crate) fn new(
         lattice: &Lattice,
         found: &Solutions,
@@ -147,7 +147,7 @@ pub(crate) fn plausible(name: &NameReading) -> f64 {
     PLAUSIBLE_STRAIN.max(2.0 * name.strain.min(PLAUSIBLE_STRAIN))
 }
 
-/// The names of the solutions in their order, each with its default reading: θ > 0 and ε ≥ 0 where there is one.
+/// The names of the solutions in their order, each with its default solution: θ > 0 and ε ≥ 0 where there is one.
 fn by_name(found: &Solutions) -> Vec<NameReading> {
     let mut names: Vec<NameReading> = Vec::new();
     for branch in found.branches.iter().filter(|b| b.twist >= 0.0) {

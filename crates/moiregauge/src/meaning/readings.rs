@@ -1,4 +1,4 @@
-//! What one moiré lattice can mean: all readings, what isotropic strain does to them, and the strain
+//! What one moiré lattice can mean: all solutions, what isotropic strain does to them, and the strain
 //! tensor where the orientation of a layer is known.
 //!
 //! In: a lattice (nm) with its covariance, the settings. Out: rad, no dimension.
@@ -67,7 +67,7 @@ impl Readings {
     }
 }
 
-/// All readings of a lattice with uniaxial strain alone.
+/// All solutions of a lattice with uniaxial strain alone.
 pub(crate) struct AllNames {
     pub(crate) naming: Option<Naming>,
     pub(crate) complete_to: f64,

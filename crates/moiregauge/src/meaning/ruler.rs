@@ -24,7 +24,7 @@ pub(crate) struct ByRuler {
 }
 
 impl ByRuler {
-    /// Of a lattice in nm of a ruler, which is layer 1 or layer 2; `None` where it goes with no reading.
+    /// Of a lattice in nm of a ruler, which is layer 1 or layer 2; `None` where it goes with no solution.
     pub(crate) fn new(
         ruler: &Ruler,
         layer: u8,

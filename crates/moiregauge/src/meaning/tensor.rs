@@ -21,14 +21,14 @@ const ROUNDING: f64 = 1e-6;
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct TensorReading {
-    /// The best reading; its covariance holds noise, drift, sensors and the orientation.
+    /// The best solution; its covariance holds noise, drift, sensors and the orientation.
     pub best: StrainTensor,
     /// Covariance of `(θ, α, mean, shear)` with calibration and lattice constants as well.
     pub known: Matrix5<f64>,
-    /// Two equal layers: the reading for the other sense of the twist, as good as `best`, which has θ > 0; `None`
+    /// Two equal layers: the solution for the other sense of the twist, as good as `best`, which has θ > 0; `None`
     /// where the sense is known.
     pub opposite: Option<SenseReading>,
-    /// Other readings of the same orientation with a mean strain below 1 %.
+    /// Other solutions of the same orientation with a mean strain below 1 %.
     pub alternatives: Vec<StrainTensor>,
     /// ν of the strained layer.
     pub poisson_ratio: f64,
@@ -37,11 +37,11 @@ pub struct TensorReading {
     pub other_vector: Option<f64>,
     /// By how many σ the orientation of the other layer is off at least, where that is a contradiction.
     pub disagreement: Option<f64>,
-    /// Whether the sense of the twist that was given goes with no reading.
+    /// Whether the sense of the twist that was given goes with no solution.
     pub sense_contradicted: bool,
 }
 
-/// The reading for one sense of the twist.
+/// The solution for one sense of the twist.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct SenseReading {
@@ -52,7 +52,7 @@ pub struct SenseReading {
 }
 
 impl SenseReading {
-    /// The reading with everything in the budget for its covariance.
+    /// The solution with everything in the budget for its covariance.
     pub fn in_all(&self) -> StrainTensor {
         StrainTensor {
             covariance: self.known,
@@ -67,7 +67,7 @@ pub(crate) fn known_orientation(settings: &Settings) -> Option<KnownOrientation>
 }
 
 impl TensorReading {
-    /// `None` without an orientation, and where it goes with no reading.
+    /// `None` without an orientation, and where it goes with no solution.
     pub(crate) fn new(lattice: &Lattice, budget: &Budget, settings: &Settings) -> Option<Self> {
         let bilayer = settings.bilayer();
         let orientation = Orientation::of(&known_orientation(settings)?, bilayer);
@@ -105,7 +105,7 @@ impl TensorReading {
         })
     }
 
-    /// The best reading with everything in the budget for its covariance.
+    /// The best solution with everything in the budget for its covariance.
     pub fn in_all(&self) -> StrainTensor {
         StrainTensor {
             covariance: self.known,
@@ -113,7 +113,7 @@ impl TensorReading {
         }
     }
 
-    /// Where the sense of the twist is open: the magnitudes of θ that the two readings span, with 1.96 σ of all in the
+    /// Where the sense of the twist is open: the magnitudes of θ that the two solutions span, with 1.96 σ of all in the
     /// budget on either side, rad.
     pub fn magnitudes(&self) -> Option<[f64; 2]> {
         let both = [self.in_all(), self.opposite.as_ref()?.in_all()];
@@ -125,7 +125,7 @@ impl TensorReading {
     }
 }
 
-/// The readings that go with the orientation of the other layer, if that is known too: those whose χ² is within 9 of the
+/// The solutions that go with the orientation of the other layer, if that is known too: those whose χ² is within 9 of the
 /// least one. Beside them how many σ the best is off, where that is a contradiction.
 fn with_other_layer(
     all: Vec<StrainTensor>,
@@ -164,7 +164,7 @@ fn with_other_layer(
     (all.into_iter().filter(left).collect(), disagreement)
 }
 
-/// The covariance of a reading with calibration and lattice constants as well.
+/// The covariance of a solution with calibration and lattice constants as well.
 fn known(
     best: &StrainTensor,
     lattice: &Lattice,
@@ -173,7 +173,7 @@ fn known(
     settings: &Settings,
 ) -> Option<Matrix5<f64>> {
     let bilayer = settings.bilayer();
-    // The same reading for other errors: its orientation is known exactly there.
+    // The same solution for other errors: its orientation is known exactly there.
     let exact = Orientation {
         sigma: 0.0,
         ..*orientation

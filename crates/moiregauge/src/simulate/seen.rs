@@ -23,7 +23,7 @@ pub struct SampleTruth {
     pub places: Vec<PlaceTruth>,
 }
 
-/// Area means of the local twist and strain: what the uniaxial reading of the local lattice gives.
+/// Area means of the local twist and strain: what the uniaxial solution of the local lattice gives.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[non_exhaustive]
 pub struct MeanTruth {

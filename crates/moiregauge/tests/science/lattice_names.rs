@@ -1,4 +1,4 @@
-//! Every name of a lattice: the truth is among the readings up to the strain that is stated, and what decides among them.
+//! Every name of a lattice: the truth is among the solutions up to the strain that is stated, and what decides among them.
 //! The forward equation is written out here once more, without the names of the library.
 use std::f64::consts::{PI, TAU};
 
@@ -70,7 +70,7 @@ fn layers(pair: &[Material; 2]) -> Bilayer<'_> {
 }
 
 /// 0.1 to 2°, strains up to the bound, equal layers of two kinds and graphene on hBN: what was put in is one of the
-/// readings to 10⁻⁹, whatever pair of vectors the lattice comes with.
+/// solutions to 10⁻⁹, whatever pair of vectors the lattice comes with.
 #[test]
 fn the_truth_is_always_listed() {
     let mut numbers = Numbers(3);
@@ -113,7 +113,7 @@ fn the_truth_is_always_listed() {
         });
         assert!(hit.is_some(), "{} {truth:?}", layers.name());
         strongest = strongest.max(strain.abs() / twist.abs());
-        // The name says which waves are meant: the same reading comes back from them alone.
+        // The name says which waves are meant: the same solution comes back from them alone.
         let hit = hit.unwrap();
         let waves = hit.name.waves(&lattice.basis);
         let again = twist_strain(

@@ -1,4 +1,4 @@
-//! Two equal layers and the orientation of one of them: which sense the twist has is open, and both readings are there.
+//! Two equal layers and the orientation of one of them: which sense the twist has is open, and both solutions are there.
 //! In: stackings that are put in. Nothing is simulated.
 use heterostrain::lattice::Lattice;
 use heterostrain::material::Material;
@@ -89,7 +89,7 @@ fn is(found: &StrainTensor, made: &Stacking) -> bool {
     (found.twist - made.twist).abs() < 1e-10 && (found.mean - mean(made)).abs() < 1e-10
 }
 
-/// 18 negative and 18 positive twists: the truth is one of two readings of equal rank, and that the sense is open is said.
+/// 18 negative and 18 positive twists: the truth is one of two solutions of equal rank, and that the sense is open is said.
 #[test]
 fn both_senses_are_there() {
     for made in stackings() {
@@ -159,7 +159,7 @@ fn what_settles_nothing_is_said() {
     );
 }
 
-/// Noise on the lattice and on the orientation: the reading of the right sense is off by its σ, whichever sense that is.
+/// Noise on the lattice and on the orientation: the solution of the right sense is off by its σ, whichever sense that is.
 #[test]
 fn the_right_reading_has_honest_errors() {
     let mut pulls = [0.0; 2];

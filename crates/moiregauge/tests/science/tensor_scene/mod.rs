@@ -125,7 +125,7 @@ pub(crate) fn truth(simulation: &Simulation) -> [f64; 6] {
 }
 
 impl Outcome {
-    /// The strain tensor of the set. An orientation is known modulo 60°, and different layers may then have two readings of
+    /// The strain tensor of the set. An orientation is known modulo 60°, and different layers may then have two solutions of
     /// little strain: the one that was put in, whichever comes first, if the ambiguity is told.
     pub(crate) fn tensor(&self) -> StrainTensor {
         let mean = self.analysis.sets[0].mean.as_ref().expect("a mean");
@@ -140,7 +140,7 @@ impl Outcome {
             .expect("a tensor")
     }
 
-    /// Whether different layers have more than one reading, and the analysis says so.
+    /// Whether different layers have more than one solution, and the analysis says so.
     pub(crate) fn is_ambiguous(&self) -> bool {
         let told = |c: &Caveat| c.code() == "orientation-ambiguous";
         self.simulation.sample.substrate.is_some() && self.analysis.caveats.iter().any(told)

@@ -1,9 +1,9 @@
 """
-Pitfall: one moiré, two readings
-================================
+Pitfall: one moiré, two solutions
+=================================
 
 Graphene on hBN. The layers differ in lattice constant. Then one twist with tension and another twist with compression give exactly the
-same moiré. Both readings fit equally well, and the program prints both.
+same moiré. Both solutions fit equally well, and the program prints both.
 """
 
 import matplotlib.pyplot as plt
@@ -17,10 +17,10 @@ for twist, colour in ((0.7, mg.DOWN), (1.1, mg.UP)):
         cell = mg.moire(work, "--layers", "graphene/hBN", "--twist", twist, "--strain", strain, "--strain-axis", 20)["cell"]
         vectors = [",".join(str(c) for c in v) for v in cell["vectors_nm"][:2]]
         back = mg.moire(work, "--layers", "graphene/hBN", "--vectors", *vectors)
-        for reading in back["readings"]["solutions"]:
-            theta, epsilon = reading["twist_deg"]["value"], reading["strain_percent"]["value"]
+        for solution in back["readings"]["solutions"]:
+            theta, epsilon = solution["twist_deg"]["value"], solution["strain_percent"]["value"]
             if theta > 0 and abs(epsilon) < 0.5:
                 ax.plot(strain, theta, "o" if epsilon > 0 else "s", color=colour, mfc=colour if epsilon > 0 else "none")
-ax.set(xlabel="true strain (%)", ylabel="twist of the reading (°)", ylim=(0.3, 1.3))
-ax.set_title("full: tension, the true reading; open: compression, same image", fontsize=9)
+ax.set(xlabel="true strain (%)", ylabel="twist of the solution (°)", ylim=(0.3, 1.3))
+ax.set_title("full: tension, the true solution; open: compression, same image", fontsize=9)
 plt.show()

@@ -1,7 +1,7 @@
-//! All readings of a moiré of twisted bilayer graphene.
+//! All solutions of a moiré of twisted bilayer graphene.
 //!
 //! ```text
-//! cargo run -p heterostrain --example readings -- 12.9,0.4 6.1,11.5
+//! cargo run -p heterostrain --example solutions -- 12.9,0.4 6.1,11.5
 //! ```
 
 use std::error::Error;
