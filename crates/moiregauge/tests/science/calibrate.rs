@@ -13,6 +13,8 @@ use moiregauge::simulate::{Pattern, Simulation, Simulator};
 use nalgebra::Matrix2;
 use rayon::prelude::*;
 
+use crate::draws::draws;
+
 /// Two frames, up and down, of an atomic lattice; no position sensors.
 fn atoms(seed: u64) -> Simulation {
     let mut set = Simulation {
@@ -110,10 +112,10 @@ fn assert_honest(all: &[[f64; 3]], what: &str) {
 }
 
 /// One pair of frames tells the scanner as well as it says, drift and all: each number of the first ten scanners within
-/// 3 σ, and as many of all hundred within 1 σ as there have to be.
+/// 3 σ, and as many of all within 1 σ as there have to be.
 #[test]
 fn a_pair_of_frames_tells_the_scanner() {
-    let all: Vec<[f64; 3]> = (0..100_u64)
+    let all: Vec<[f64; 3]> = (0..u64::from(draws(20)))
         .into_par_iter()
         .map(|seed| {
             let set = atoms(seed);
@@ -134,7 +136,7 @@ fn a_pair_of_frames_tells_the_scanner() {
 #[test]
 fn one_frame_does_not_tell_drift_from_gain() {
     let sigma = 0.1;
-    let all: Vec<[f64; 3]> = (0..60_u64)
+    let all: Vec<[f64; 3]> = (0..u64::from(draws(20)))
         .into_par_iter()
         .map(|seed| {
             let mut set = atoms(seed);

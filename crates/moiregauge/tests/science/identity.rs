@@ -13,6 +13,8 @@ use moiregauge::settings::{GivenDrift, Grouping, Settings};
 use moiregauge::simulate::{FirstDirection, Simulation, Simulator};
 use spmfile::{FrameDirection, Samples, Scan, sensor_axis};
 
+use crate::draws::draws;
+
 /// A small, quick set.
 fn small_set(seed: u64) -> Simulation {
     let mut simulation = Simulation {
@@ -337,7 +339,8 @@ fn turned_over(scan: &mut Scan) {
 fn headers_that_contradict_the_images_are_named() {
     let doubts = ["headers-contradict-images", "frames-do-not-link"];
     let told = Cell::new(0);
-    for seed in 0..21 {
+    let sets = draws(12);
+    for seed in 0..sets.into() {
         let good = frames(&drifting(seed));
         let of = |change: &dyn Fn(&mut Scan)| {
             let mut scans = good.clone();
@@ -379,7 +382,7 @@ fn headers_that_contradict_the_images_are_named() {
         }
     }
     // The right entry in nearly all of them.
-    assert!(told.get() >= 19, "{}", told.get());
+    assert!(10 * told.get() >= 9 * sets as usize, "{}", told.get());
 }
 
 /// Aligned layers make a moiré of `a₁a₂/|a₁ − a₂|`, the longest there is: a lattice half as long again is refused with

@@ -1,5 +1,6 @@
 //! The lattice fit against the truth, the Cramér–Rao bound, and everything that goes wrong in scans.
 
+use crate::draws::{draws, mean_square};
 use crate::fit_scene::{Contrast, Scene, Wave};
 use moiregauge::frame::Background;
 use moiregauge::frame::Image;
@@ -119,8 +120,7 @@ fn white_noise_reaches_the_bound() {
 }
 
 /// Stated errors are true along either axis with line offsets, white or 1/f from line to line, and
-/// with noise that is 1/f in time, few periods and a sharp contrast. The spread of 240 pulls is known
-/// to 1/√480 = 4.6 %; three times that.
+/// with noise that is 1/f in time, few periods and a sharp contrast: the mean square of two pulls an image.
 #[test]
 fn coloured_noise_is_told_from_the_image() {
     for (name, periods, contrast, [white, line, flicker, line_flicker]) in [
@@ -129,7 +129,8 @@ fn coloured_noise_is_told_from_the_image() {
         ("1/f", 8.0, Contrast::Spots, [0.5, 0.0, 0.7, 0.0]),
         ("walls", 2.5, Contrast::Walls, [1.0, 0.3, 0.0, 0.0]),
     ] {
-        let found = statistics(120, |seed| {
+        let images = draws(20);
+        let found = statistics(images.into(), |seed| {
             let angle = 0.618 * seed as f64;
             let mut scene = Scene::new([128, 128], periods, angle, contrast, seed);
             (scene.white, scene.line) = (white, line);
@@ -137,19 +138,23 @@ fn coloured_noise_is_told_from_the_image() {
             scene
         });
         for axis in found.axes {
-            assert!((axis - 1.0).abs() < 3.0 * 0.046, "{name}: {:?}", found.axes);
+            let square = axis * axis;
+            assert!(
+                mean_square(2 * images).contains(&square),
+                "{name}: {square}"
+            );
         }
     }
 }
 
 /// Where a harmonic runs along the slow axis, line offsets take up nearly all of it: its phase is then as
-/// uncertain as it says, with offsets that are white and offsets that are 1/f from line to line. The spread of
-/// 240 pulls is known to 4.6 %; three times that.
+/// uncertain as it says, with offsets that are white and offsets that are 1/f from line to line.
 #[test]
 fn phases_on_the_ridge_of_line_noise_are_as_uncertain_as_they_say() {
     for (line, line_flicker) in [(0.5, 0.0), (0.0, 0.5)] {
-        let (mut squares, mut count) = (0.0, 0.0);
-        for seed in 0..240 {
+        let images = draws(40);
+        let (mut squares, mut count) = (0.0, 0);
+        for seed in 0..images.into() {
             let angle = 0.3 * (2.0 * (0.618_034 * seed as f64).fract() - 1.0);
             let mut scene = Scene::new([128, 128], 6.0, angle, Contrast::Cosines, seed);
             (scene.white, scene.line, scene.line_flicker) = (0.5, line, line_flicker);
@@ -157,13 +162,13 @@ fn phases_on_the_ridge_of_line_noise_are_as_uncertain_as_they_say() {
             for (cycles, pull) in scene.phase_pulls(&measured) {
                 if cycles < 2.2 {
                     squares += pull * pull;
-                    count += 1.0;
+                    count += 1;
                 }
             }
         }
-        assert_eq!(count, 240.0);
-        let spread = f64::sqrt(squares / count);
-        assert!((spread - 1.0).abs() < 3.0 * 0.046, "{line} {spread}");
+        assert_eq!(count, images);
+        let square = squares / f64::from(count);
+        assert!(mean_square(count).contains(&square), "{line} {square}");
     }
 }
 
