@@ -321,7 +321,7 @@ fn frames_that_drift_by_a_third_of_their_width() {
 #[test]
 fn atoms_that_drift_turn_by_what_they_say_or_are_refused() {
     let mut given = 0;
-    let all: Vec<_> = (0..12_u64)
+    let all: Vec<_> = (0..u64::from(draws(6)))
         .into_par_iter()
         .flat_map_iter(|seed| [0.7, 1.5, 2.4].map(|speed| (seed, speed)))
         .map(|(seed, speed)| {
@@ -345,6 +345,7 @@ fn atoms_that_drift_turn_by_what_they_say_or_are_refused() {
             (seed, speed, set.sample.lattice_angle_deg, found)
         })
         .collect();
+    let tried = all.len();
     for (seed, speed, truth, found) in all {
         match found {
             Ok(found) => {
@@ -360,7 +361,7 @@ fn atoms_that_drift_turn_by_what_they_say_or_are_refused() {
             Err(reason) => println!("{speed} nm/min, {seed}: {reason}"),
         }
     }
-    assert!(given >= 18, "{given} of 36");
+    assert!(2 * given >= tried, "{given} of {tried}");
 }
 
 /// What no scanner can be is said with its numbers, refused where it is to be applied, and not silently left out.
