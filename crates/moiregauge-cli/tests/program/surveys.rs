@@ -119,21 +119,21 @@ fn survey(folder: &Path, files: &[&str], options: &[&str]) -> Value {
 #[test]
 fn parts_of_a_survey_lie_where_they_were() {
     let folder = tempfile::tempdir().expect("a folder");
-    let mut scene = FieldScene::rippled(600, 37.5, 0.03);
+    let mut scene = FieldScene::rippled(420, 37.5, 0.03);
     scene.white = 0.6;
     let image = scene.image();
-    simple_field(&folder.path().join("all.gsf"), &image, [0, 0], [600, 600]);
+    simple_field(&folder.path().join("all.gsf"), &image, [0, 0], [420, 420]);
     // They overlap, as the margin of each has no good nodes.
     let names = ["a.gsf", "b.gsf", "c.gsf", "d.gsf"];
-    let firsts = [[0, 0], [240, 0], [0, 240], [240, 240]];
+    let firsts = [[0, 0], [168, 0], [0, 168], [168, 168]];
     for (name, first) in names.iter().zip(firsts) {
-        simple_field(&folder.path().join(name), &image, first, [360, 360]);
+        simple_field(&folder.path().join(name), &image, first, [252, 252]);
     }
     let boxes = [
         "--region",
-        "seam=150,150,120,120",
+        "seam=105,105,84,84",
         "--region",
-        "corner=300,300,60,60",
+        "corner=210,210,42,42",
         "--window",
         "9",
     ];
