@@ -8,4 +8,4 @@ MOIREGAUGE_DRAWS=${1:-200} cargo test --release -p moiregauge --test science -- 
   errors_cover_the_truth errors_of_partly_covered_frames_cover coloured_noise_is_told_from_the_image \
   phases_on_the_ridge_of_line_noise_are_as_uncertain_as_they_say a_pair_of_frames_tells_the_scanner \
   one_frame_does_not_tell_drift_from_gain atoms_that_drift_turn_by_what_they_say_or_are_refused \
-  headers_that_contradict_the_images_are_named
+  headers_that_contradict_the_images_are_named a_constant_lattice_is_left_alone
