@@ -168,7 +168,7 @@ mod tests {
     #[test]
     fn what_is_told_becomes_options_and_is_told_again() {
         use clap::Parser as _;
-        use moiregauge_serve::told_as_options;
+        use moiregauge_serve::user_specified_as_options;
         #[derive(clap::Parser)]
         struct Typed {
             #[command(flatten)]
@@ -187,9 +187,9 @@ mod tests {
             crop: parse_crop("1,2,3,4").ok(),
         };
         let typed = ["program".to_owned()].into_iter();
-        let typed = Typed::parse_from(typed.chain(told_as_options(&told)));
+        let typed = Typed::parse_from(typed.chain(user_specified_as_options(&told)));
         assert_eq!(typed.known.user_specified(), told);
-        assert!(told_as_options(&UserSpecified::default()).is_empty());
+        assert!(user_specified_as_options(&UserSpecified::default()).is_empty());
     }
 
     #[test]

@@ -52,4 +52,4 @@ pub use feed::Feed;
 pub use options::Options;
 #[cfg(not(target_family = "wasm"))]
 pub use run::serve;
-pub use typed::{map_as_options, told_as_options};
+pub use typed::{map_as_options, user_specified_as_options};

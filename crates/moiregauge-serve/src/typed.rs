@@ -6,8 +6,8 @@ use moiregauge_pipeline::maps::{MapRequest, When};
 use moiregauge_report::results::{Crop, FrameOrder, UserSpecified};
 
 /// The options of the program that tell what the user specified.
-pub fn told_as_options(told: &UserSpecified) -> Vec<String> {
-    let frame = told.frame_direction.map(|order| {
+pub fn user_specified_as_options(specified: &UserSpecified) -> Vec<String> {
+    let frame = specified.frame_direction.map(|order| {
         let name = match order {
             FrameOrder::Up => "up",
             FrameOrder::Down => "down",
@@ -18,16 +18,25 @@ pub fn told_as_options(told: &UserSpecified) -> Vec<String> {
     });
     let block = |c: Crop| format!("{},{},{},{}", c.column, c.top, c.columns, c.rows);
     let all = [
-        ("--size", told.size_nm.map(|[w, h]| format!("{w}nm×{h}nm"))),
-        ("--unit", told.unit.clone()),
-        ("--line-rate", told.line_rate_hz.map(|hz| hz.to_string())),
+        (
+            "--size",
+            specified.size_nm.map(|[w, h]| format!("{w}nm×{h}nm")),
+        ),
+        ("--unit", specified.unit.clone()),
+        (
+            "--line-rate",
+            specified.line_rate_hz.map(|hz| hz.to_string()),
+        ),
         ("--frame-direction", frame),
-        ("--rotation", told.rotation_deg.map(|deg| deg.to_string())),
-        ("--x-sensor", told.x_sensor.clone()),
-        ("--y-sensor", told.y_sensor.clone()),
-        ("--sensor-unit", told.sensor_unit.clone()),
-        ("--sensors", told.sensors.clone()),
-        ("--crop", told.crop.map(block)),
+        (
+            "--rotation",
+            specified.rotation_deg.map(|deg| deg.to_string()),
+        ),
+        ("--x-sensor", specified.x_sensor.clone()),
+        ("--y-sensor", specified.y_sensor.clone()),
+        ("--sensor-unit", specified.sensor_unit.clone()),
+        ("--sensors", specified.sensors.clone()),
+        ("--crop", specified.crop.map(block)),
     ];
     let given = all
         .into_iter()

@@ -12,7 +12,7 @@ use serde_json::{Map, Value};
 
 use crate::problem::{Answer, Problem};
 use crate::roots::{File, Roots};
-use crate::typed::told_as_options;
+use crate::typed::user_specified_as_options;
 
 /// The name of the settings file that goes with a command.
 pub(crate) const SETTINGS_FILE: &str = "settings.toml";
@@ -114,7 +114,7 @@ impl Asked {
         if self.settings_file()?.is_some() {
             all.extend(["--config".to_owned(), SETTINGS_FILE.to_owned()]);
         }
-        all.extend(told_as_options(&self.known));
+        all.extend(user_specified_as_options(&self.known));
         Ok(all)
     }
 
