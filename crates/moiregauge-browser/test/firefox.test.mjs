@@ -47,14 +47,14 @@ async function opened(folder) {
 test("in Firefox: numbers, a map, a correction by hand, a zip; what is no scan is named", async () => {
   const page = await opened(DOWNLOADS);
   const files = scansOf(simulated("plain"));
-  const [text, broken] = [join(WORK, "firefox-notes.txt"), join(WORK, "firefox-broken.spm")];
+  const [text, broken] = [join(WORK, "unread-notes.txt"), join(WORK, "unread-broken.spm")];
   writeFileSync(text, "A day at the microscope.\n");
   writeFileSync(broken, readFileSync(files[0]).subarray(0, 9000));
   await page.drop([...files, text, broken]);
   await page.analyse();
   const before = await page.results();
   same(before, byProgram(files, "firefox"));
-  assert.deepEqual(before.failed.map((/** @type {any} */ f) => f.file).sort(), ["firefox-broken.spm", "firefox-notes.txt"]);
+  assert.deepEqual(before.failed.map((/** @type {any} */ f) => f.file).sort(), ["unread-broken.spm", "unread-notes.txt"]);
   await page.view("Correct");
   await page.until("return document.documentElement.dataset.correct !== undefined");
   await page.nextResult(() => page.run(`const handle = document.querySelector("[aria-label='Lattice vector 1']"); handle.focus();

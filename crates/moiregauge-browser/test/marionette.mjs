@@ -79,9 +79,10 @@ export async function firefox(program, url, folder) {
     type: async (selector, text) => send("WebDriver:ElementSendKeys", { id: await element(selector), text }),
     leave: async () => {
       const ended = new Promise((done) => child.once("exit", done));
-      await send("Marionette:Quit", { flags: ["eForceQuit"] }).catch(() => undefined);
-      await Promise.race([ended, rest(10000)]);
-      child.kill();
+      // It may end before it answers.
+      send("Marionette:Quit", { flags: ["eForceQuit"] }).catch(() => undefined);
+      await ended;
+      socket.destroy();
     },
   };
 }
