@@ -22,6 +22,8 @@ export async function firefox(program, url, folder) {
     "datareporting.policy.dataSubmissionEnabled": false, "browser.download.alwaysOpenPanel": false };
   writeFileSync(join(folder, "user.js"), Object.entries(prefs).map(([k, v]) => `user_pref(${JSON.stringify(k)}, ${JSON.stringify(v)});\n`).join(""));
   const child = spawn(program, ["--headless", "--marionette", "--no-remote", "--profile", folder], { stdio: "ignore" });
+  // A test that fails leaves none behind.
+  process.on("exit", () => child.kill());
   const port = join(folder, "MarionetteActivePort");
   for (let i = 0; !existsSync(port) || readFileSync(port, "utf8") === ""; i++) {
     if (i > 600) throw new Error("Firefox does not begin");
