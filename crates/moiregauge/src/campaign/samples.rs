@@ -9,10 +9,10 @@ use heterostrain::lattice::{Waves, same_handed};
 use nalgebra::Vector2;
 
 use crate::campaign::group::{Group, folder};
+use crate::campaign::shells::of_each_other;
 use crate::caveat::Caveat;
 use crate::caveat::sets::{DifferentSamples, SetDoubt};
 use crate::scan::measured::MeasuredScan;
-use crate::scan::shells::of_each_other;
 use crate::settings::knobs::Settings;
 
 /// Lattices whose waves differ by more than this share along the fast axis are of different samples, or places:

@@ -1,7 +1,4 @@
-//! The images of a set say together whether their lattice is the second shell of another.
-//!
-//! A weak first shell stands out of the noise in some images and not in others, and those measure a lattice of a third of the cell. What each has
-//! at the places of the first shell is known; all together tell what no image can.
+//! Lattices of a set of which one holds the other: an image that does not show the first waves of a lattice shows a harmonic shell as a lattice.
 
 use crate::campaign::group::Group;
 use crate::caveat::files::FileDoubt;
@@ -9,23 +6,44 @@ use crate::caveat::lattices::LineDifference;
 use crate::caveat::sets::SetDoubt;
 use crate::caveat::{Caveat, Doubt};
 use crate::explain::cells::BETTER;
-use crate::lattice::fit::hidden::Hidden;
-use crate::lattice::measure::hidden;
 use crate::scan::doubts::lines_disagree;
 use crate::scan::measure::{about_lattice, share_noise};
 use crate::scan::measured::{MeasuredLine, MeasuredScan};
-use crate::scan::shells::{CONFIRMED, cells};
 
-/// Ratio of the numbers of lines from which a lattice is the second shell of another: lines that show the other cannot all be wrong about the same waves.
+/// Cells of a harmonic shell for each of the lattice: 3 (the second shell), 4 (the third), 2 (every other row).
+const CELLS: std::ops::RangeInclusive<i32> = 2..=4;
+/// Lattices of trace and retrace agree to this share of a vector: creep and lag are smaller. Half and twice as much
+/// change no result of docs/constants.md.
+const AGREE: f64 = 0.1;
+/// Ratio of the numbers of lines from which a lattice is a harmonic shell of another: lines that show the other cannot all be wrong about the same waves.
 const OUTVOTED: usize = 3;
 
-/// Takes the lattice of which that which was measured is the second shell in all images of a set that say so together.
+/// How many times the cell of one image is that of the other, if one lattice holds the other.
+pub(crate) fn of_each_other(one: &MeasuredLine, other: &MeasuredLine) -> Option<i32> {
+    times(one, other).or_else(|| times(other, one))
+}
+
+/// The cells of `small` in one of `large`, several, if all of its points are points of `small`.
+fn times(large: &MeasuredLine, small: &MeasuredLine) -> Option<i32> {
+    cells(large, small).filter(|cells| CELLS.contains(cells))
+}
+
+/// The cells of `small` in one of `large`, if all of its points are points of `small`: 1 where they are one lattice.
+fn cells(large: &MeasuredLine, small: &MeasuredLine) -> Option<i32> {
+    let vectors = |line: &MeasuredLine| line.geometry.pixel_to_nm * line.lattice.pixels.basis;
+    let names = vectors(small).try_inverse()? * vectors(large);
+    let whole = names.map(f64::round);
+    let cells = whole.determinant().abs().round() as i32;
+    ((names - whole).amax() < AGREE && cells > 0).then_some(cells)
+}
+
+/// Leaves out the lines that show a harmonic shell of the lattice of most.
 pub(crate) fn agree(groups: &mut [Group], caveats: &mut Vec<Caveat>) {
     for group in groups {
-        let second = second_shells(&group.scans);
-        for (scan, second) in group.scans.iter_mut().zip(second) {
-            if second.contains(&true) {
-                caveats.extend(take_first_shells(scan, &second));
+        let outvoted = outvoted(&group.scans);
+        for (scan, outvoted) in group.scans.iter_mut().zip(outvoted) {
+            if outvoted.contains(&true) {
+                caveats.extend(leave_out(scan, &outvoted));
             }
         }
     }
@@ -37,110 +55,49 @@ fn counts(scan: &MeasuredScan) -> bool {
     scan.repeats.is_none() && !scan.excluded.as_ref().is_some_and(other)
 }
 
-/// A lattice that lines of a set show.
-struct Seen<'a> {
-    /// One that shows it, ...
-    line: &'a MeasuredLine,
-    /// ... how many do, ...
-    lines: usize,
-    /// ... what all say together, ...
-    told: Hidden,
-    /// ... and what waves of the first shell predict of each, standard errors.
-    predicts: Vec<f64>,
-}
-
-/// What the first shell of a line that may show the second predicts, standard errors.
-fn predicts(line: &MeasuredLine) -> Option<f64> {
-    line.first_shell.as_ref()?.evidence.as_ref()?.predicts
-}
-
-/// What first shells predict in several images together, standard errors.
-fn together(predicts: &[f64]) -> f64 {
-    predicts.iter().sum::<f64>() / (predicts.len().max(1) as f64).sqrt()
-}
-
-/// Whether the first shells that lines may hide predict next to nothing.
-pub(crate) fn are_refuted<'a>(lines: impl Iterator<Item = &'a MeasuredLine>) -> bool {
-    let predicts: Vec<f64> = lines.filter_map(predicts).collect();
-    !predicts.is_empty() && together(&predicts) < BETTER / 2.0
-}
-
-fn lattices<'a>(all: &[&'a MeasuredLine]) -> Vec<Seen<'a>> {
-    let mut found: Vec<Seen> = Vec::new();
-    for line in all {
-        let told = hidden(&line.lattice);
-        match found.iter_mut().find(|f| cells(f.line, line) == Some(1)) {
-            Some(seen) => {
-                seen.told = Hidden::of_all([seen.told, told].into_iter());
-                seen.lines += 1;
-                seen.predicts.extend(predicts(line));
-            }
-            None => found.push(Seen {
-                line,
-                lines: 1,
-                told,
-                predicts: predicts(line).into_iter().collect(),
-            }),
-        }
-    }
-    found
-}
-
-/// Which lines of each scan show the second shell of their lattice.
-fn second_shells(scans: &[MeasuredScan]) -> Vec<Vec<bool>> {
-    let all: Vec<&MeasuredLine> = scans
-        .iter()
-        .filter(|scan| counts(scan))
-        .flat_map(|scan| &scan.lines)
-        .collect();
-    let suspected = all.iter().any(|line| line.first_shell.is_some());
-    let lattices = lattices(&all);
-    let is_second = |seen: &Seen| {
-        let is_larger = |other: &&Seen| cells(other.line, seen.line) == Some(3);
-        let larger: usize = lattices.iter().filter(is_larger).map(|l| l.lines).sum();
-        let told = seen.told.is_first_shell() || (seen.told.chance() < CONFIRMED && larger > 0);
-        (suspected && told && together(&seen.predicts) > BETTER) || larger >= OUTVOTED * seen.lines
-    };
-    let second: Vec<&MeasuredLine> = lattices
-        .iter()
-        .filter(|lattice| is_second(lattice))
-        .map(|lattice| lattice.line)
-        .collect();
-    let shows_it = |line: &MeasuredLine| second.iter().any(|other| cells(other, line) == Some(1));
-    let of_scan = |scan: &MeasuredScan| {
-        let asked = counts(scan);
-        scan.lines
+/// Which lines of each scan show a harmonic shell of the lattice that several times as many lines show, or any where the larger cell predicts
+/// better in sum.
+fn outvoted(scans: &[MeasuredScan]) -> Vec<Vec<bool>> {
+    let all = || {
+        scans
             .iter()
-            .map(|line| asked && shows_it(line))
-            .collect()
+            .filter(|scan| counts(scan))
+            .flat_map(|scan| &scan.lines)
+    };
+    let is_shell = |line: &MeasuredLine| {
+        let larger = all().filter(|other| times(other, line).is_some()).count();
+        let same = all().filter(|other| cells(other, line) == Some(1)).count();
+        let alike = all().filter(|other| cells(other, line) == Some(1));
+        larger >= OUTVOTED * same || (larger > 0 && together(alike) > BETTER)
+    };
+    let of_scan = |scan: &MeasuredScan| {
+        let each = scan.lines.iter();
+        each.map(|line| counts(scan) && is_shell(line)).collect()
     };
     scans.iter().map(of_scan).collect()
 }
 
-/// Takes the first shell where the second was measured; lines that do not know it are left out. What there is to say of a scan without any.
-fn take_first_shells(scan: &mut MeasuredScan, second: &[bool]) -> Option<Caveat> {
-    let reason = || "noise hides the first waves of its lattice".to_owned();
-    let (mut lines, mut left_out) = (Vec::new(), false);
-    for (line, second) in scan.lines.iter().zip(second) {
-        let mut line = line.clone();
-        if *second {
-            let Some(first) = line.first_shell.take() else {
-                left_out = true;
-                continue;
-            };
-            line.lattice = *first;
-        }
-        lines.push(line);
-    }
+/// By how many standard errors lattices of which theirs are harmonic shells predict better, in several images together.
+fn together<'a>(lines: impl Iterator<Item = &'a MeasuredLine>) -> f64 {
+    let evidence = lines.filter_map(|line| line.lattice.evidence.as_ref());
+    let all: Vec<f64> = evidence.map(|evidence| evidence.larger).collect();
+    all.iter().sum::<f64>() / (all.len().max(1) as f64).sqrt()
+}
+
+/// Leaves lines of a scan out. What there is to say of a scan without any.
+fn leave_out(scan: &mut MeasuredScan, outvoted: &[bool]) -> Option<Caveat> {
+    let reason = "it shows a harmonic shell of the lattice of the others".to_owned();
+    let lines = scan.lines.iter().zip(outvoted);
+    let mut lines: Vec<MeasuredLine> = lines
+        .filter(|(_, outvoted)| !**outvoted)
+        .map(|(line, _)| line.clone())
+        .collect();
     if lines.is_empty() {
-        let reason = reason();
         scan.excluded = Some(reason.clone());
         return Some(Caveat::new(SetDoubt::ScanLeftOut { reason }, &scan.file));
     }
-    if left_out {
-        let doubt = FileDoubt::LineLeftOut { reason: reason() };
-        scan.caveats.push(Caveat::new(doubt, &scan.file));
-    }
+    let doubt = FileDoubt::LineLeftOut { reason };
+    scan.caveats.push(Caveat::new(doubt, &scan.file));
     share_noise(&mut lines);
     scan.caveats
         .retain(|caveat| !matches!(caveat.doubt, Doubt::Lattice(_)));
@@ -150,4 +107,19 @@ fn take_first_shells(scan: &mut MeasuredScan, second: &[bool]) -> Option<Caveat>
     scan.excluded = lines_disagree(&scan.file, &lines, &mut scan.caveats);
     scan.lines = lines.into();
     None
+}
+
+/// How many times the cell of one line direction is that of the other, in a scan that shows both, or of other scans beside these.
+pub(crate) fn of_other_shell(group: &Group) -> Option<i32> {
+    group.other_shell.or_else(|| of_lines(group))
+}
+
+fn of_lines(group: &Group) -> Option<i32> {
+    let differs = |reason: &String| reason == LineDifference::OTHER_LATTICES;
+    let scans = group.scans.iter();
+    let mut differing = scans.filter(|scan| scan.excluded.as_ref().is_some_and(differs));
+    differing.find_map(|scan| match &*scan.lines {
+        [one, other] => of_each_other(one, other),
+        _ => None,
+    })
 }

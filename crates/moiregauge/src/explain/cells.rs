@@ -70,8 +70,8 @@ impl Supercell {
 pub(crate) struct Nested {
     /// Reciprocal pair (rad per pixel) of one that predicts the image better.
     pub(crate) better: Option<Matrix2<f64>>,
-    /// That of a larger cell whose waves may be those of something else, and by how many standard errors it predicts better.
-    pub(crate) doubtful: Option<(Matrix2<f64>, f64)>,
+    /// That of the larger cell, not taken, that predicts better by most standard errors, and how many.
+    pub(crate) larger: Option<(Matrix2<f64>, f64)>,
 }
 
 /// Compares the lattice of `pair` (reciprocal, rad per pixel) with those of larger and smaller cells.
@@ -80,11 +80,13 @@ pub(crate) fn better_cell(image: &Image, pair: &Matrix2<f64>) -> Nested {
     let elongated = is_elongated(pair);
     let rows = (0..3).map(Supercell::Rows).filter(|_| elongated);
     let all = all.into_iter().chain(rows);
-    let mut doubtful = None;
+    let mut larger: Option<(Matrix2<f64>, f64)> = None;
     let mut is_shown =
-        |coarse: &Matrix2<f64>, supercell| match superlattice(image, coarse, supercell, false) {
-            Some(Superlattice::Doubtful(by)) => {
-                doubtful = Some((*coarse, by));
+        |coarse: &Matrix2<f64>, supercell| match superlattice(image, coarse, supercell) {
+            Some(Superlattice::NotShown(by)) => {
+                if by > larger.map_or(0.0, |(_, most)| most) {
+                    larger = Some((*coarse, by));
+                }
                 false
             }
             said => said == Some(Superlattice::Shown),
@@ -92,8 +94,8 @@ pub(crate) fn better_cell(image: &Image, pair: &Matrix2<f64>) -> Nested {
     let mut coarse = all
         .clone()
         .filter_map(|supercell| Some((supercell, supercell.coarse(pair)?)));
-    let larger = coarse.find(|(supercell, coarse)| is_shown(coarse, *supercell));
-    let better = larger.or_else(|| {
+    let shown = coarse.find(|(supercell, coarse)| is_shown(coarse, *supercell));
+    let better = shown.or_else(|| {
         let mut fine = all.map(|supercell| (supercell, supercell.fine(pair)));
         fine.find(|(supercell, fine)| {
             // Moirés of hexagonal layers are nearly hexagons: half-order waves in one direction make a superlattice of one.
@@ -103,7 +105,7 @@ pub(crate) fn better_cell(image: &Image, pair: &Matrix2<f64>) -> Nested {
         })
     });
     let better = better.map(|(_, pair)| pair);
-    Nested { better, doubtful }
+    Nested { better, larger }
 }
 
 /// Whether the longest of the three first-order waves has more than one and a half times the wave vector of the shortest.
@@ -127,22 +129,17 @@ fn predicts_as_well(image: &Image, one: &Matrix2<f64>, other: &Matrix2<f64>) -> 
 pub(crate) enum Superlattice {
     /// Its waves predict, in all three directions, and lie on its points.
     Shown,
-    /// They do not predict, or not in all directions: noise may hide them, or there are none.
-    NotShown,
-    /// They predict better by this many standard errors, and with wave vectors of their own better still, by two to four.
-    Doubtful(f64),
-    /// The waves near its points are not its harmonics: they predict better with free wave vectors, or worse than nothing in some direction.
-    Refuted,
+    /// They predict better by this many standard errors, but by too few, not in all directions, or better still with wave vectors of their own. 0 where
+    /// they are not its harmonics.
+    NotShown(f64),
 }
 
 /// Whether an image shows the lattice with the larger cell and not only that with the smaller. `coarse`: reciprocal pair of the larger cell, at 60°,
-/// rad per pixel; `image`: without its background; `suspected`: non-lattice peaks near its points are looked for even where the larger cell does not
-/// predict better. `None` where the two cannot be compared.
+/// rad per pixel; `image`: without its background. `None` where the two cannot be compared.
 pub(crate) fn superlattice(
     image: &Image,
     coarse: &Matrix2<f64>,
     supercell: Supercell,
-    suspected: bool,
 ) -> Option<Superlattice> {
     let fine = supercell.fine(coarse);
     let scene = Scene::new(image, coarse, &fine)?;
@@ -179,21 +176,16 @@ pub(crate) fn superlattice(
         let without = of(&|i| is_fine(indices[i]) || !in_line(indices[i], *first))?;
         Some(errors(&large, &without))
     };
-    let predicts = errors(&large, &small) > BETTER;
-    if !predicts && !suspected {
-        return Some(Superlattice::NotShown);
+    let predicts = errors(&large, &small);
+    if predicts < BETTER {
+        return Some(Superlattice::NotShown(predicts.max(0.0)));
     }
     let first: Vec<[i32; 2]> = FIRST_SHELL.into_iter().filter(|i| !is_fine(*i)).collect();
     let adds: Option<Vec<f64>> = first.iter().map(adds).collect();
     let least = adds?.into_iter().fold(f64::INFINITY, f64::min);
     if least < 0.0 {
-        return Some(Superlattice::Refuted);
+        return Some(Superlattice::NotShown(0.0));
     }
-    let said = if predicts && least > BETTER / 2.0 {
-        Superlattice::Shown
-    } else {
-        Superlattice::NotShown
-    };
     // Waves with wave vectors of their own in place of the first order.
     let others: Vec<[i32; 2]> = indices
         .iter()
@@ -217,10 +209,12 @@ pub(crate) fn superlattice(
     let all: Vec<usize> = (0..2 * (others.len() + first.len())).collect();
     let beside = gains(&normals, &all)?;
     let by = errors(&beside, &large);
-    Some(match said {
-        _ if by > BETTER => Superlattice::Refuted,
-        Superlattice::Shown if by > BETTER / 2.0 => Superlattice::Doubtful(errors(&large, &small)),
-        said => said,
+    Some(if by > BETTER {
+        Superlattice::NotShown(0.0)
+    } else if least > BETTER / 2.0 && by <= BETTER / 2.0 {
+        Superlattice::Shown
+    } else {
+        Superlattice::NotShown(predicts)
     })
 }
 

@@ -80,6 +80,13 @@ impl Image {
     }
 }
 
+/// The differences of two images of one size.
+pub(crate) fn without(image: &Image, other: &Image) -> Image {
+    let both = image.values.iter().zip(&other.values);
+    let values = both.map(|(value, other)| value - other);
+    Image::new(image.rows, image.columns, values.collect())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

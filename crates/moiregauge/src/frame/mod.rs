@@ -1,5 +1,6 @@
 //! One frame: its pixels, where each of them was and when, and images resampled to be shown.
 
+pub(crate) mod artefacts;
 pub(crate) mod axis;
 pub(crate) mod background;
 pub(crate) mod blur;

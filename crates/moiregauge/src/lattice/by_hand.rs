@@ -10,7 +10,7 @@ use nalgebra::Matrix2;
 use crate::frame::background::Background;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
-use crate::lattice::ground::below;
+use crate::lattice::ground::{WAYS, below};
 use crate::lattice::measured::MeasuredLattice;
 use crate::lattice::start::Start;
 use crate::spectrum::error::LatticeError;
@@ -91,7 +91,7 @@ pub(crate) fn measure_by_hand(
         return start.measure(method);
     }
     // Ground that is stronger than its waves hides it.
-    let find = |even: &Arc<Image>, geometry: &Geometry| {
+    let find = |even: &Arc<Image>| {
         let is_meant = |pair: &Matrix2<f64>| meant.is_near(pair, geometry);
         let first = meant.first(geometry);
         let start = Start::find_meant(even, geometry, background, first, &is_meant)?;
@@ -99,7 +99,7 @@ pub(crate) fn measure_by_hand(
     };
     let flat = levelled(image.clone(), background)?;
     let found = (method == Method::Lattice)
-        .then(|| below(&flat, geometry, background, &find))
+        .then(|| below(&flat, geometry, background, &find, WAYS))
         .flatten();
     found.ok_or(LatticeError::NotThere)
 }

@@ -9,8 +9,8 @@ use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::lattice::fit::few::FewWaves;
 use crate::lattice::fit::fitted::LatticeFit;
-use crate::lattice::ground::below;
-use crate::lattice::measure::{beside, hidden, measure_levelled, no_lattice, of_first_shell};
+use crate::lattice::ground::{WAYS, below};
+use crate::lattice::measure::{beside, measure_levelled, no_lattice};
 use crate::lattice::measured::MeasuredLattice;
 use crate::lattice::predicted::{best_predicted, judged};
 use crate::lattice::start::Start;
@@ -49,15 +49,23 @@ pub(crate) fn measure_own(
     if method != Method::Lattice {
         return measure_levelled(&image, geometry, background, method);
     }
-    let found = measure_beside(&image, geometry, background).or_else(|error| {
-        let find = |even: &Arc<Image>, geometry: &Geometry| {
-            measure_levelled(even, geometry, background, method).ok()
-        };
-        below(&image, geometry, background, &find)
-            .or_else(|| best_predicted(&image, geometry, background))
+    let by_peaks = |image: &Arc<Image>| {
+        let found = measure_beside(image, geometry, background);
+        found.and_then(|found| judged(found, image, geometry, background))
+    };
+    let by_prediction = |image: &Arc<Image>| {
+        let found = best_predicted(image, geometry, background)?;
+        judged(found, image, geometry, background).ok()
+    };
+    let below = |find: &dyn Fn(&Arc<Image>) -> Option<MeasuredLattice>, ways| {
+        below(&image, geometry, background, find, ways)
+    };
+    by_peaks(&image).or_else(|error| {
+        below(&|even| by_peaks(even).ok(), WAYS)
+            .or_else(|| by_prediction(&image))
+            .or_else(|| below(&by_prediction, 1))
             .ok_or(error)
-    });
-    found.and_then(|found| judged(found, &image, geometry, background))
+    })
 }
 
 /// The lattice of an image without its background, and of perfect waves beside it.
@@ -107,9 +115,7 @@ fn beside_stripes(
     let (rest, wave) = waves.taken_off(image, &pair)?;
     let start = Start::at(&rest, geometry, background, &pair)?;
     let mut found = start.measure(method).ok()?;
-    if hidden(&found).is_first_shell() {
-        found = of_first_shell(&found, &rest, geometry, background, method)?;
-    } else if no_lattice(&found).is_some() {
+    if no_lattice(&found).is_some() {
         return None;
     }
     if let Some(fit) = &mut found.fit {

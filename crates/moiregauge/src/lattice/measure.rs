@@ -10,14 +10,12 @@ use crate::frame::background::Background;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::lattice::fit::fitted::{FittedHarmonic, LatticeFit};
-use crate::lattice::fit::hidden::{Hidden, first_shell};
 use crate::lattice::fit::noise::ForeignWave;
 use crate::lattice::measured::MeasuredLattice;
-use crate::lattice::predicted::{of_better_cell, with_evidence, without_refuted_shell};
+use crate::lattice::predicted::of_better_cell;
 use crate::lattice::start::Start;
 use crate::spectrum::error::{LatticeError, SECOND, THIRD};
 use crate::spectrum::method::Method;
-use crate::spectrum::prepare::levelled;
 use crate::spectrum::shells::FIRST_SHELL;
 
 /// Amplitude of the higher orders over the first from which the first order has to be significant. Chosen by eye.
@@ -35,12 +33,11 @@ pub(crate) fn measure_levelled(
     background: Background,
     method: Method,
 ) -> Result<MeasuredLattice, LatticeError> {
-    let found = find_anywhere(image, geometry, background, method)?.measure(method)?;
+    let found = find_anywhere(image, geometry, background)?.measure(method)?;
     if let Some(error) = no_lattice(&found) {
         return Err(error);
     }
-    let found = of_better_cell(found, image, geometry, background, method);
-    Ok(without_refuted_shell(found, image))
+    Ok(of_better_cell(found, image, geometry, background, method))
 }
 
 /// Why the amplitudes of the fit refuse a lattice.
@@ -76,45 +73,6 @@ fn first_order_is_missing(found: &MeasuredLattice) -> bool {
         .any(|cells| harmonics_beside(fit, *cells).len() < FEWEST_BESIDE)
 }
 
-/// What a lattice that was measured leaves where the first shell would be, if it is the second shell of another.
-pub(crate) fn hidden(found: &MeasuredLattice) -> Hidden {
-    let fit = found.fit.as_ref();
-    fit.map_or_else(Hidden::default, |fit| fit.hidden)
-}
-
-/// The lattice of which that which was found in an image is the second shell.
-///
-/// # Errors
-/// As [`measure`](crate::lattice::find::measure); [`LatticeError::NoPeaks`] where it cannot be measured.
-pub(crate) fn measure_first_shell(
-    image: Image,
-    geometry: &Geometry,
-    background: Background,
-    method: Method,
-    found: &MeasuredLattice,
-) -> Result<MeasuredLattice, LatticeError> {
-    let image = Arc::new(levelled(image, background)?);
-    let first = of_first_shell(found, &image, geometry, background, method);
-    let first = first.ok_or(LatticeError::NoPeaks { method })?;
-    Ok(with_evidence(first, &image, geometry).0)
-}
-
-/// The same of an image whose background is off already.
-pub(crate) fn of_first_shell(
-    found: &MeasuredLattice,
-    image: &Image,
-    geometry: &Geometry,
-    background: Background,
-    method: Method,
-) -> Option<MeasuredLattice> {
-    let pair = first_shell(&found.reciprocal);
-    let part = found.patch.as_ref();
-    let first = measure_pair(&pair, part, image, geometry, background, method)?;
-    // Waves that miss its points are those of something else.
-    let agrees = |found: &MeasuredLattice| !found.fit.as_ref().is_some_and(LatticeFit::disagrees);
-    (agrees(&first) || !agrees(found)).then_some(first)
-}
-
 /// The lattice of some pair of waves (rad per pixel) in a part of an image, or in all of it; `None` where it cannot be measured.
 pub(crate) fn measure_pair(
     pair: &Matrix2<f64>,
@@ -140,13 +98,7 @@ pub(crate) fn measure_whole(
     background: Background,
     method: Method,
 ) -> Result<MeasuredLattice, LatticeError> {
-    let start = match Start::find(image, geometry, background) {
-        Err(error @ LatticeError::NoLattice { .. }) if method == Method::Lattice => {
-            Start::find_again(image, geometry, background).map_err(|_| error)?
-        }
-        other => other?,
-    };
-    start.measure(method)
+    Start::find(image, geometry, background)?.measure(method)
 }
 
 /// A wave that stands out beside the lattice.
@@ -163,7 +115,6 @@ fn find_anywhere(
     image: &Arc<Image>,
     geometry: &Geometry,
     background: Background,
-    method: Method,
 ) -> Result<Start, LatticeError> {
     let whole = match Start::find_in_levelled(image, geometry, background) {
         Ok(start) => start.on_the_whole_frame(image),
@@ -176,11 +127,5 @@ fn find_anywhere(
     if first.is_none() && !matches!(error, LatticeError::NoLattice { .. }) {
         return Err(error);
     }
-    let found = Start::find_patch(image, geometry, background, first);
-    let again = || Start::find_again(image, geometry, background).ok();
-    let found = match method {
-        Method::Lattice => found.or_else(again),
-        _ => found,
-    };
-    found.ok_or(error)
+    Start::find_patch(image, geometry, background, first).ok_or(error)
 }

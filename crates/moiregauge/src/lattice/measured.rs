@@ -68,7 +68,7 @@ pub struct MeasuredLattice {
     pub(crate) beside: Vec<MeasuredLattice>,
     /// Reciprocal pair (rad per pixel) of a larger cell that its waves may have, and by how many standard errors that predicts better.
     #[serde(skip)]
-    pub(crate) doubtful_cell: Option<(Matrix2<f64>, f64)>,
+    pub(crate) larger_cell: Option<(Matrix2<f64>, f64)>,
     /// What the other estimator found: autocorrelation beside Fourier, Fourier beside all others.
     #[serde(with = "exact")]
     pub comparison: Option<Lattice<Px>>,
@@ -112,6 +112,9 @@ pub struct Evidence {
     pub predicts: Option<f64>,
     /// How many waves of about its period beside it are as strong as its weakest one.
     pub rivals: usize,
+    /// By how many standard errors a lattice predicts better of which it is a harmonic shell and that was not taken.
+    #[serde(with = "exact")]
+    pub larger: f64,
     /// The lattices that were compared: this one, then the others, those that predict most first.
     #[serde(default)]
     pub candidates: Vec<Candidate>,

@@ -3,15 +3,14 @@
 use heterostrain::lattice::distortion;
 use nalgebra::Matrix2;
 
-use crate::explain::cells::{BETTER, Supercell, Superlattice, better_cell, superlattice};
+use crate::explain::cells::{BETTER, better_cell};
 use crate::explain::evidence::{gain, proposed, weakest};
 use crate::explain::table::{Row, table};
 use crate::frame::background::Background;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::lattice::fit::fitted::LatticeFit;
-use crate::lattice::fit::hidden::Hidden;
-use crate::lattice::measure::{hidden, measure_pair, no_lattice};
+use crate::lattice::measure::{measure_pair, no_lattice};
 use crate::lattice::measured::{Candidate, Evidence, MeasuredLattice};
 use crate::lattice::start::Start;
 use crate::spectrum::error::{LatticeError, SECOND};
@@ -34,8 +33,6 @@ const MOST_CHANGE: f64 = 0.6;
 /// Fewest periods across the frame: a few protrusions can mimic a lattice. Of simulated discs with sharp edges 0.8 to 1.0 fit across the
 /// frame, of the smallest recorded images three.
 const FEWEST_PERIODS: f64 = 1.5;
-/// As in `scan::shells`: p-value of the first order below which it may be suppressed.
-const SUSPECTED: f64 = 0.2;
 
 /// The lattice with several times the cell, or a part of it, that predicts the image better than the one that was found; that one if none does.
 pub(crate) fn of_better_cell(
@@ -53,35 +50,8 @@ pub(crate) fn of_better_cell(
         no_lattice(&other).is_none().then_some(other)
     };
     let mut better = measured().unwrap_or(found);
-    better.doubtful_cell = nested.doubtful;
+    better.larger_cell = nested.larger;
     better
-}
-
-/// Clears the evidence for a suppressed first order if the prediction of held-out pixels refutes it. The set then does not use it.
-pub(crate) fn without_refuted_shell(mut found: MeasuredLattice, image: &Image) -> MeasuredLattice {
-    if hidden(&found).chance() < SUSPECTED
-        && is_refuted(&found, image) == Some(true)
-        && let Some(fit) = &mut found.fit
-    {
-        fit.hidden = Hidden::default();
-    }
-    found
-}
-
-/// True if the peaks near the points of a suppressed first order are not its harmonics.
-fn is_refuted(found: &MeasuredLattice, image: &Image) -> Option<bool> {
-    let part = found.patch.as_ref().map(|patch| patch.of(image));
-    let coarse = Supercell::Root3.coarse(&found.reciprocal)?;
-    let said = superlattice(
-        part.as_ref().unwrap_or(image),
-        &coarse,
-        Supercell::Root3,
-        true,
-    )?;
-    Some(matches!(
-        said,
-        Superlattice::Refuted | Superlattice::Doubtful(_)
-    ))
 }
 
 /// The proposed lattice that predicts held-out pixels best, if it exceeds [`BEYOND_DOUBT`]. Spots of differing height put noise beside each peak, and the search
@@ -151,7 +121,8 @@ pub(crate) fn with_evidence(
     let better = rows.iter().find(is_better).map(|row| row.pair);
     let candidates = rows.iter().map(|row| Candidate::new(row, &to_physical));
     // Waves near the points of a larger cell that may be its own.
-    let doubtful = found.doubtful_cell.map(|(pair, better)| Row {
+    let doubtful = found.larger_cell.filter(|(_, better)| *better > BETTER);
+    let doubtful = doubtful.map(|(pair, better)| Row {
         share: gain(part, &pair).unwrap_or(0.0),
         cells: 1,
         pair,
@@ -167,6 +138,7 @@ pub(crate) fn with_evidence(
     found.evidence = Some(Evidence {
         predicts: weakest(part, &found.reciprocal, bends),
         rivals,
+        larger: found.larger_cell.map_or(0.0, |(_, better)| better),
         candidates: candidates.chain(doubtful).collect(),
     });
     (found, better)

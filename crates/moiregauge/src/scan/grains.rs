@@ -28,7 +28,6 @@ pub(crate) fn grains(lines: Vec<MeasuredLine>) -> Vec<Vec<MeasuredLine>> {
             .into_iter()
             .map(|lattice| MeasuredLine {
                 lattice,
-                first_shell: None,
                 ..line.clone()
             })
             .collect();

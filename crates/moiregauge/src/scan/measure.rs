@@ -11,7 +11,6 @@ use crate::frame::image::Image;
 use crate::frame::polygon;
 use crate::lattice::by_hand::{Meant, measure_by_hand};
 use crate::lattice::find::measure_own;
-use crate::lattice::measure::measure_first_shell;
 use crate::lattice::measured::MeasuredLattice;
 use crate::lattice::several::atoms;
 use crate::lattice::several::together::measure_several;
@@ -30,7 +29,6 @@ use crate::scan::place::Place;
 use crate::scan::positions::pitch_sigma;
 use crate::scan::scanner::about_calibration;
 use crate::scan::shared::correlation;
-use crate::scan::shells::{keep_first_shells, of_first_shells};
 use crate::settings::by_hand::ByHand;
 use crate::settings::knobs::Settings;
 use crate::spectrum::error::LatticeError;
@@ -67,7 +65,7 @@ pub fn measure_known(
         let start = Start::find_known(&image, geometry, settings.background, cell)?;
         Ok(vec![start.measure(settings.method)?])
     };
-    Ok(measure_with(file, scan, settings, None, &find, false)?.swap_remove(0))
+    Ok(measure_with(file, scan, settings, None, &find)?.swap_remove(0))
 }
 
 /// Measures every moiré of one scan, as many as `settings` say, the largest cell first; otherwise as
@@ -116,21 +114,18 @@ pub fn measure_moires(
             measure_several(&image, &plane, background, n)
         }
     };
-    let searched = settings.moires < 2 && told.is_nothing();
-    measure_with(file, scan, settings, window, &find, searched)
+    measure_with(file, scan, settings, window, &find)
 }
 
 /// How the lattices of an image are found and measured; at least one.
 type Find<'a> = &'a dyn Fn(Image, &Geometry) -> Result<Vec<MeasuredLattice>, LatticeError>;
 
-/// `searched`: which lattice it is was not told, so that it may be the second shell of another.
 fn measure_with(
     file: &str,
     scan: &Scan,
     settings: &Settings,
     window: Option<&Window>,
     find: Find,
-    searched: bool,
 ) -> Result<Vec<MeasuredScan>, MeasureError> {
     if let Some(problem) = settings.scanner.as_ref().and_then(Calibration::problem) {
         return Err(MeasureError::Calibration(problem));
@@ -155,17 +150,6 @@ fn measure_with(
             Ok(lines) => found.push((*channel, lines)),
             Err(error) => failures.push(error),
         }
-    }
-    if searched {
-        let (background, method) = (settings.background, settings.method);
-        let again = |channel: &Channel, second: &MeasuredLattice| {
-            measure(channel, &|image, geometry| {
-                let first = measure_first_shell(image, geometry, background, method, second)?;
-                Ok(vec![first])
-            })
-        };
-        of_first_shells(&mut found, &again);
-        keep_first_shells(&mut found, &again);
     }
     for (_, (lines, told)) in found {
         caveats.extend(told);
@@ -316,7 +300,6 @@ fn measure_line(
             frame_columns: channel.columns,
             lines_after,
             lattice,
-            first_shell: None,
             speeds,
             pitch_sigma: pitch,
             speed_error,

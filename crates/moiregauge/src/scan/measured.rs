@@ -74,9 +74,6 @@ pub struct MeasuredLine {
     pub lines_after: usize,
     /// The lattice in pixels.
     pub lattice: MeasuredLattice,
-    /// That of which it may be the second shell, where the image alone cannot tell.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub(crate) first_shell: Option<Box<MeasuredLattice>>,
     /// Tip speeds along the fast and slow axes, nm/s; σ is the spread over the lines. NaN without timing.
     #[serde(with = "exact")]
     pub speeds: [Estimate; 2],

@@ -16,7 +16,6 @@ pub(crate) mod place;
 pub(crate) mod positions;
 pub(crate) mod scanner;
 pub(crate) mod shared;
-pub(crate) mod shells;
 pub(crate) mod written;
 
 pub use channel::{channels_by_preference, choose_channel, plain_name};

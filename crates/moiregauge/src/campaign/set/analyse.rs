@@ -13,8 +13,8 @@ use crate::campaign::set::mean::{at_drift, forward_backward, without_drift};
 use crate::campaign::set::moire::{breaks, draw};
 use crate::campaign::set::ruler::{ruled, tell};
 use crate::campaign::set::scan::scans_at_drift;
-use crate::campaign::set::shells::{of_other_shell, of_second_shell};
 use crate::campaign::set::{joint, published};
+use crate::campaign::shells::of_other_shell;
 use crate::caveat::Caveat;
 use crate::caveat::drifting::{DriftDoubt, DriftShare};
 use crate::caveat::sets::SetDoubt;
@@ -70,7 +70,7 @@ pub(crate) fn analyse_set(
     }
     let grid = grid_errors(&used, settings);
     // What is told by hand is known to be there.
-    let doubt = no_result(group, &used).filter(|_| !settings.by_hand.says_which());
+    let doubt = no_result(group).filter(|_| !settings.by_hand.says_which());
     let outruns = of_set.and_then(|drift| outruns(drift, &all));
     let doubt = doubt.or_else(|| outruns.map(|share| SetDoubt::DriftOutrunsScan { share }));
     let (mut uncorrected, mut mean, mut lattice, mut ruler) = (None, None, None, None);
@@ -147,9 +147,8 @@ fn is_better(ruler: &Ruled, mean: Option<&SetMean>, settings: &Settings) -> bool
 }
 
 /// Why the lattice of a set may be another one, so that the set has no result.
-fn no_result(group: &Group, used: &[&MeasuredScan]) -> Option<SetDoubt> {
-    let hidden = of_other_shell(group).or_else(|| of_second_shell(used));
-    hidden.map(|times| SetDoubt::ShellForLattice { times })
+fn no_result(group: &Group) -> Option<SetDoubt> {
+    of_other_shell(group).map(|times| SetDoubt::ShellForLattice { times })
 }
 
 /// The scans that are not left out, by their number.

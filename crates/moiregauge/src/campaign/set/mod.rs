@@ -14,5 +14,4 @@ pub(crate) mod moire;
 pub(crate) mod published;
 pub(crate) mod ruler;
 pub(crate) mod scan;
-pub(crate) mod shells;
 pub(crate) mod solved;

@@ -15,7 +15,6 @@ use crate::lattice::fit::fitted::{FittedHarmonic, LatticeFit};
 use crate::lattice::fit::folded::{Bends, Folded};
 use crate::lattice::fit::frame::{BENT, Basis, Frame};
 use crate::lattice::fit::gram::gram;
-use crate::lattice::fit::hidden::Hidden;
 use crate::lattice::fit::leverage::Leverage;
 use crate::lattice::fit::lines::LineStatistics;
 use crate::lattice::fit::model::{Clip, LineOffsets, Model, look, settled};
@@ -367,11 +366,6 @@ impl<'a> Fit<'a> {
             .collect()
     }
 
-    /// What is left where the first shell would be, if this lattice is the second of another.
-    pub(crate) fn hidden(&self, noise: &FinalNoise) -> Hidden {
-        noise.residual.hidden(&self.model, self.has_offsets())
-    }
-
     pub(crate) fn result(
         &self,
         noise: &FinalNoise,
@@ -425,7 +419,6 @@ impl<'a> Fit<'a> {
             lines_left_out: self.frame.image.rows - self.frame.lines(),
             clipped,
             foreign_wave,
-            hidden: self.hidden(noise),
             residual: noise.places.left.clone(),
             inhomogeneity,
             closure,

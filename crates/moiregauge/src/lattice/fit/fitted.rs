@@ -7,7 +7,6 @@ use serde::{Deserialize, Serialize};
 use crate::lattice::fit::bend::Inhomogeneity;
 use crate::lattice::fit::closure::Closure;
 use crate::lattice::fit::frame;
-use crate::lattice::fit::hidden::Hidden;
 use crate::lattice::fit::left::LeftOver;
 use crate::lattice::fit::noise::ForeignWave;
 use crate::numbers::exact;
@@ -46,9 +45,6 @@ pub struct LatticeFit {
     pub clipped: f64,
     /// The strongest wave that is left and none of the lattice's: a second lattice, or pick-up.
     pub foreign_wave: Option<ForeignWave>,
-    /// Whether it may be the second shell of another lattice.
-    #[serde(default)]
-    pub(crate) hidden: Hidden,
     /// The transform of what is left, across the lines from each of the first three harmonics: two images tell by it what noise they
     /// share.
     #[serde(default)]

@@ -33,7 +33,6 @@ pub(crate) mod fitted;
 pub(crate) mod folded;
 pub(crate) mod frame;
 pub(crate) mod gram;
-pub(crate) mod hidden;
 pub(crate) mod joint;
 pub(crate) mod left;
 pub(crate) mod leverage;
