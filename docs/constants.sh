@@ -45,7 +45,6 @@ coverage/grains NEITHER edge,island,grains half double
 coverage/grains SEEDS edge,island,grains half double
 coverage/grains NEAR edge,island,grains half double
 scan/grains SAME grains half double
-scan/shells AGREE second half double
 bend THRESHOLD few,moirés,gradient,grains half double
 bend HARMLESS few,moirés,gradient,grains half double
 fit/bend CUBIC few,moirés,gradient,grains half double
@@ -66,15 +65,6 @@ fit/few OPEN +stripes half double
 fit/joint FARTHEST +stripes half double
 fit/joint APART +stripes half double
 fit/joint CLOSE +stripes half double
-fit/hidden NOISE_KNOWN_TO second root double
-fit/hidden SLOW second half double
-fit/hidden OWN second half double
-fit/hidden AS_LONG second half double
-fit/hidden LOBE second half double
-fit/hidden ELSE second half double
-scan/shells SUSPECTED second half double
-scan/shells CONFIRMED second half double
-fit/hidden SECOND_SHELL second half double
 lattice/measure MIN_HIGHER_ORDER_RATIO second,step half double
 lattice/measure FEWEST_BESIDE second,step half double
 lattice/ground PERIODS step,bump half double
@@ -83,7 +73,6 @@ lattice/ground SMALLEST step,bump half double
 frame/median_ground BINS step,bump half double
 set/drift OUTRUN_SIGMAS step half double
 set/drift KNOWN_TO grains half double
-campaign/shells OUTVOTED second half double
 campaign/grains CONTRADICTED grains half double
 campaign/grains BETTER_KNOWN grains half double
 fit/closure STRONG few,noisy,contrast half double

@@ -275,8 +275,8 @@ explain! { LatticeDoubt:
          this part, and the rest was left out."
         "Look at the figure of the scan: the outline shows where the lattice was measured."
     GroundTakenOff "ground-taken-off" Note
-        "Steps, bumps or a rough background hide the lattice. It was found and measured in the image without them. A part of a \
-         background that is as short as the lattice is left, alike in all frames."
+        "Steps, bumps, a rough background, spikes, line offsets or inverted contrast hide the lattice. It was found and \
+         measured in the image without them. A part of a background that is as short as the lattice is left, alike in all frames."
         "Look at the figure of the scan. A channel that shows less topography, as the phase, serves better."
     Changes "changing-lattice" Note
         "The lattice changes across the frame by more than chance. The results are means over the area that it covers. \

@@ -12,7 +12,7 @@ use crate::lattice::fit::fitted::LatticeFit;
 use crate::lattice::ground::{WAYS, below};
 use crate::lattice::measure::{beside, measure_levelled, no_lattice};
 use crate::lattice::measured::MeasuredLattice;
-use crate::lattice::predicted::{best_predicted, judged};
+use crate::lattice::predicted::{LEAST, best_predicted, judged};
 use crate::lattice::start::Start;
 use crate::spectrum::error::LatticeError;
 use crate::spectrum::method::Method;
@@ -60,8 +60,13 @@ pub(crate) fn measure_own(
     let below = |find: &dyn Fn(&Arc<Image>) -> Option<MeasuredLattice>, ways| {
         below(&image, geometry, background, find, ways)
     };
+    // Of several even images each may show a lattice by chance.
+    let surely = |found: &MeasuredLattice| {
+        let predicts = found.evidence.as_ref().and_then(|e| e.predicts);
+        predicts.is_some_and(|least| least > 2.0 * LEAST)
+    };
     by_peaks(&image).or_else(|error| {
-        below(&|even| by_peaks(even).ok(), WAYS)
+        below(&|even| by_peaks(even).ok().filter(surely), WAYS)
             .or_else(|| by_prediction(&image))
             .or_else(|| below(&by_prediction, 1))
             .ok_or(error)

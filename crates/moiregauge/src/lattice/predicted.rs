@@ -26,7 +26,7 @@ use crate::spectrum::transform::Spectrum;
 const BEYOND_DOUBT: f64 = 5.0;
 /// Smallest significance of the prediction, standard errors. True lattices had at least 2.3 (60 sets with one to four defects; the smallest is of one that
 /// covers half the frame and fades), single steps at most 0.
-const LEAST: f64 = 1.5;
+pub(crate) const LEAST: f64 = 1.5;
 /// Largest relative change of the waves from corner to corner: gradients and waves of twist and strain make up
 /// to a tenth, creep in a frame of four periods of atoms a half, and holes that pass for a coarse lattice 0.7 to 1.4.
 const MOST_CHANGE: f64 = 0.6;

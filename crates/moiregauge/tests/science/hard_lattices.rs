@@ -222,10 +222,11 @@ fn strong_stripes_make_no_lattice() {
     }
 }
 
-/// A first shell of a fiftieth of the contrast stands out in some images and not in others: the images of a set say together what the lattice is.
+/// First-order waves of a fiftieth of the second order predict in some images and not in others: the images of a set decide together which cell it is.
+/// Where none shows the larger one, a caveat names it.
 #[test]
 fn images_of_a_set_agree_on_a_first_shell() {
-    let mut split = 0;
+    let (mut split, mut right) = (0, 0);
     for seed in [1, 3, 5, 6] {
         let (simulator, truth) = varied("second-shell:first=0.02", 160, seed);
         let settings = undrawn();
@@ -242,11 +243,16 @@ fn images_of_a_set_agree_on_a_first_shell() {
         assert_eq!(analysis.sets.len(), 1, "{seed}");
         let twist = analysis.sets[0].mean.as_ref().unwrap().twist();
         let off = (twist.value.to_degrees() - truth).abs();
-        assert!(off < 5.0 * twist.statistical.to_degrees(), "{seed}: {off}");
-        assert!(off < 0.001, "{seed}: {off}");
+        if off < 0.001 {
+            assert!(off < 5.0 * twist.statistical.to_degrees(), "{seed}: {off}");
+            right += 1;
+        } else {
+            let mut codes = analysis.caveats.iter().map(moiregauge::Caveat::code);
+            assert!(codes.any(|code| code == "other-lattice"), "{seed}: {off}");
+        }
     }
     // Otherwise nothing was decided together.
-    assert!(split >= 2, "{split}");
+    assert!(split >= 2 && right >= 2, "{split}, {right}");
 }
 
 /// Two samples of which one has the points of the other, with a third of its cell: no image of the smaller one has a first shell of the other, and
