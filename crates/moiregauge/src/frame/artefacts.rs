@@ -36,7 +36,9 @@ pub(crate) fn without_line_offsets(image: &Image) -> Image {
             offset += median(&mut steps);
         }
         let line = &mut level.values[row * image.columns..][..image.columns];
-        line.iter_mut().for_each(|value| *value -= offset);
+        for value in line {
+            *value -= offset;
+        }
     }
     level
 }

@@ -93,7 +93,7 @@ fn on_even_ground(
             return None;
         }
         again.ground = Some(side as f64);
-        again.evidence = before.evidence.clone();
+        again.evidence.clone_from(&before.evidence);
         again.larger_cell = before.larger_cell;
         found = again;
     }
@@ -253,7 +253,9 @@ mod tests {
             let mut made = image(seed, 1.0);
             for row in made.values.chunks_mut(SIZE[0]).filter(|_| kind == 0) {
                 let offset = 3.0 * normal();
-                row.iter_mut().for_each(|value| *value += offset);
+                for value in row {
+                    *value += offset;
+                }
             }
             for value in made.values.iter_mut().filter(|_| kind == 1) {
                 *value += if normal() > 2.3 { 60.0 } else { 0.0 };
