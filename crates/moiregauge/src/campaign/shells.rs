@@ -66,9 +66,8 @@ fn outvoted(scans: &[MeasuredScan]) -> Vec<Vec<bool>> {
     };
     let is_shell = |line: &MeasuredLine| {
         let larger = all().filter(|other| times(other, line).is_some()).count();
-        let same = all().filter(|other| cells(other, line) == Some(1)).count();
-        let alike = all().filter(|other| cells(other, line) == Some(1));
-        larger >= OUTVOTED * same || (larger > 0 && together(alike) > BETTER)
+        let alike = || all().filter(|other| cells(other, line) == Some(1));
+        larger >= OUTVOTED * alike().count() || (larger > 0 && together(alike()) > BETTER)
     };
     let of_scan = |scan: &MeasuredScan| {
         let each = scan.lines.iter();
@@ -92,6 +91,8 @@ fn leave_out(scan: &mut MeasuredScan, outvoted: &[bool]) -> Option<Caveat> {
         .filter(|(_, outvoted)| !**outvoted)
         .map(|(line, _)| line.clone())
         .collect();
+    scan.caveats
+        .retain(|caveat| !matches!(caveat.doubt, Doubt::Lattice(_)));
     if lines.is_empty() {
         scan.excluded = Some(reason.clone());
         return Some(Caveat::new(SetDoubt::ScanLeftOut { reason }, &scan.file));
@@ -99,8 +100,6 @@ fn leave_out(scan: &mut MeasuredScan, outvoted: &[bool]) -> Option<Caveat> {
     let doubt = FileDoubt::LineLeftOut { reason };
     scan.caveats.push(Caveat::new(doubt, &scan.file));
     share_noise(&mut lines);
-    scan.caveats
-        .retain(|caveat| !matches!(caveat.doubt, Doubt::Lattice(_)));
     for line in &lines {
         about_lattice(&scan.file, &line.lattice, &line.geometry, &mut scan.caveats);
     }

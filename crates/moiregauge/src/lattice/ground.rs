@@ -85,11 +85,11 @@ fn on_even_ground(
         let waves = found.fit.as_ref()?.wave_vectors.basis;
         let part = found.patch.as_ref();
         let (even, side) = evened(image, signs, found.fit.as_ref()?, part);
-        let mut again = measure_pair(&waves, part, &even, geometry, background, Method::Lattice)?;
-        if no_lattice(&again).is_some() || !same(size, &again.reciprocal, &waves) {
+        if side as f64 > WIDEST * size[0].min(size[1]) as f64 {
             return None;
         }
-        if side as f64 > WIDEST * size[0].min(size[1]) as f64 {
+        let mut again = measure_pair(&waves, part, &even, geometry, background, Method::Lattice)?;
+        if no_lattice(&again).is_some() || !same(size, &again.reciprocal, &waves) {
             return None;
         }
         again.ground = Some(side as f64);
