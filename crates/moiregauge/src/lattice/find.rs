@@ -10,7 +10,7 @@ use crate::frame::image::Image;
 use crate::lattice::fit::few::FewWaves;
 use crate::lattice::fit::fitted::LatticeFit;
 use crate::lattice::ground::{WAYS, below};
-use crate::lattice::measure::{beside, measure_levelled, no_lattice};
+use crate::lattice::measure::{beside, measure_clipped, measure_levelled, no_lattice};
 use crate::lattice::measured::MeasuredLattice;
 use crate::lattice::predicted::{LEAST, best_predicted, judged};
 use crate::lattice::start::Start;
@@ -53,6 +53,10 @@ pub(crate) fn measure_own(
         let found = measure_beside(image, geometry, background);
         found.and_then(|found| judged(found, image, geometry, background))
     };
+    let clipped = || {
+        let found = measure_clipped(&image, geometry, background).ok()?;
+        judged(found, &image, geometry, background).ok()
+    };
     let by_prediction = |image: &Arc<Image>| {
         let found = best_predicted(image, geometry, background)?;
         judged(found, image, geometry, background).ok()
@@ -66,7 +70,8 @@ pub(crate) fn measure_own(
         predicts.is_some_and(|least| least > 2.0 * LEAST)
     };
     by_peaks(&image).or_else(|error| {
-        below(&|even| by_peaks(even).ok().filter(surely), WAYS)
+        clipped()
+            .or_else(|| below(&|even| by_peaks(even).ok().filter(surely), WAYS))
             .or_else(|| by_prediction(&image))
             .or_else(|| below(&by_prediction, 1))
             .ok_or(error)

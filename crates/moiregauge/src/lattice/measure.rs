@@ -33,7 +33,28 @@ pub(crate) fn measure_levelled(
     background: Background,
     method: Method,
 ) -> Result<MeasuredLattice, LatticeError> {
-    let found = find_anywhere(image, geometry, background)?.measure(method)?;
+    let start = find_anywhere(image, geometry, background)?;
+    measured(start, image, geometry, background, method)
+}
+
+/// The same with outliers cut off and lines levelled while the lattice is looked for.
+pub(crate) fn measure_clipped(
+    image: &Arc<Image>,
+    geometry: &Geometry,
+    background: Background,
+) -> Result<MeasuredLattice, LatticeError> {
+    let start = Start::find_again(image, geometry, background)?;
+    measured(start, image, geometry, background, Method::Lattice)
+}
+
+fn measured(
+    start: Start,
+    image: &Image,
+    geometry: &Geometry,
+    background: Background,
+    method: Method,
+) -> Result<MeasuredLattice, LatticeError> {
+    let found = start.measure(method)?;
     if let Some(error) = no_lattice(&found) {
         return Err(error);
     }

@@ -92,6 +92,16 @@ impl Start {
         Ok(Self::new(prepared, image, geometry, background))
     }
 
+    /// The same for an image whose lattice hides under tip events and line noise.
+    pub(crate) fn find_again(
+        image: &Image,
+        geometry: &Geometry,
+        background: Background,
+    ) -> Result<Self, LatticeError> {
+        let prepared = rescue::prepare_again(image, geometry, background)?;
+        Ok(Self::new(prepared, image, geometry, background))
+    }
+
     /// The reciprocal pairs (rad per pixel) that the spectrum proposes, whether they stand out or not.
     pub(crate) fn proposals(
         image: &Image,

@@ -8,16 +8,34 @@ use std::sync::Arc;
 
 use nalgebra::Matrix2;
 
-use crate::frame::background::Background;
+use crate::frame::background::{Background, remove_background};
 use crate::frame::clip::cut_off;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::spectrum::error::LatticeError;
 use crate::spectrum::known;
-use crate::spectrum::prepare::{Prepared, levelled};
+use crate::spectrum::prepare::{Prepared, levelled, prepare};
 
-/// Looks for a lattice of about the cell `known` in the image with its outliers cut off, then with levelled lines as well. The image of the result is
-/// the one given, without its background.
+/// Looks for the lattice in the image with its outliers cut off, then with levelled lines as well. The
+/// image of the result is the one given, without its background.
+pub(crate) fn prepare_again(
+    image: &Image,
+    geometry: &Geometry,
+    background: Background,
+) -> Result<Prepared, LatticeError> {
+    let flat = remove_background(image, background);
+    let clipped = cut_off(&flat);
+    let found = match prepare(&clipped, geometry, background) {
+        Err(LatticeError::NoLattice { .. }) => prepare(&clipped, geometry, Background::LineMean),
+        other => other,
+    };
+    found.map(|prepared| Prepared {
+        image: Arc::new(flat),
+        ..prepared
+    })
+}
+
+/// The same for a lattice of about the cell `known`.
 pub(crate) fn prepare_known_again(
     image: &Image,
     geometry: &Geometry,
