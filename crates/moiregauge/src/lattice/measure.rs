@@ -34,7 +34,7 @@ pub(crate) fn measure_levelled(
     method: Method,
 ) -> Result<MeasuredLattice, LatticeError> {
     let start = find_anywhere(image, geometry, background)?;
-    measured(start, image, geometry, background, method)
+    measured(&start, image, geometry, background, method)
 }
 
 /// The same with outliers cut off and lines levelled while the lattice is looked for.
@@ -44,11 +44,11 @@ pub(crate) fn measure_clipped(
     background: Background,
 ) -> Result<MeasuredLattice, LatticeError> {
     let start = Start::find_again(image, geometry, background)?;
-    measured(start, image, geometry, background, Method::Lattice)
+    measured(&start, image, geometry, background, Method::Lattice)
 }
 
 fn measured(
-    start: Start,
+    start: &Start,
     image: &Image,
     geometry: &Geometry,
     background: Background,
