@@ -92,3 +92,15 @@ for (const set of (process.env.SETS ?? "").split(":").filter((s) => s !== "")) {
     await page.leave();
   });
 }
+
+test("in Firefox: the demonstration", async () => {
+  const page = await opened(join(WORK, "firefox-demo"));
+  await page.click("Try it with simulated scans");
+  await page.until("return document.body.textContent.includes('26 scans chosen')");
+  await page.analyse();
+  const { sets } = await page.results();
+  assert.equal(sets.length, 3);
+  for (const { mean } of sets) assert.ok(Math.abs(mean.twist_deg.value - 1.13) < 3 * mean.twist_deg.sigma_total);
+  assert.deepEqual(await page.asked(), []);
+  await page.leave();
+});
