@@ -67,7 +67,8 @@ fn outvoted(scans: &[MeasuredScan]) -> Vec<Vec<bool>> {
     let is_shell = |line: &MeasuredLine| {
         let larger = all().filter(|other| times(other, line).is_some()).count();
         let alike = || all().filter(|other| cells(other, line) == Some(1));
-        larger >= OUTVOTED * alike().count() || (larger > 0 && together(alike()) > BETTER)
+        let outvoted = || larger >= OUTVOTED * alike().count() || together(alike()) > BETTER;
+        larger > 0 && outvoted()
     };
     let of_scan = |scan: &MeasuredScan| {
         let each = scan.lines.iter();

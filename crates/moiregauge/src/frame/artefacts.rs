@@ -60,6 +60,7 @@ pub(crate) fn signs(even: &Image) -> Vec<f64> {
         })
         .collect();
     let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    // Those that end below a line and those that begin at it: the last have none above.
     let pairs = sums.iter().zip(sums.iter().skip(near));
     let alike = pairs.map(|(below, above)| {
         let norm = product(below, below) * product(above, above);
@@ -86,4 +87,40 @@ pub(crate) fn turned(image: &Image, signs: &[f64]) -> Image {
     let lines = image.values.chunks(image.columns).zip(signs);
     let values = lines.flat_map(|(line, sign)| line.iter().map(move |value| sign * value));
     Image::new(image.rows, image.columns, values.collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A slope along the lines with offsets from line to line is that slope; a spike is the median of its neighbours, and a missing pixel stays missing.
+    #[test]
+    fn offsets_and_spikes_leave_the_image() {
+        let (rows, columns) = (12, 20);
+        let slope = |i: usize| 0.5 * (i % columns) as f64;
+        let offset = |row: usize| [0.0, 7.0, -3.0, 11.0][row % 4];
+        let values = (0..rows * columns).map(|i| slope(i) + offset(i / columns));
+        let mut image = Image::new(rows, columns, values.collect());
+        image.values[5 * columns + 9] = f64::NAN;
+        let level = without_line_offsets(&image);
+        for (i, value) in level.values.iter().enumerate() {
+            assert!(value.is_nan() || (value - slope(i)).abs() < 1e-12, "{i}");
+        }
+        assert!(level.values[5 * columns + 9].is_nan());
+        let mut spiked = level.clone();
+        spiked.values[7 * columns + 3] = 1e3;
+        let calm = without_spikes(&spiked);
+        assert!((calm.values[7 * columns + 3] - slope(3)).abs() <= 0.5);
+        assert!(calm.values[5 * columns + 9].is_nan());
+        let signs = [vec![1.0; 4], vec![-1.0; 8]].concat();
+        let turned = turned(&level, &signs);
+        assert_eq!(
+            turned.values[4 * columns + 8],
+            -level.values[4 * columns + 8]
+        );
+        assert_eq!(
+            turned.values[3 * columns + 8],
+            level.values[3 * columns + 8]
+        );
+    }
 }

@@ -66,7 +66,10 @@ pub(crate) fn below(
         let signs = signs(&even);
         let mut found = find(&Arc::new(turned(&even, &signs)))?;
         found.ground = Some(side);
-        let fine = on_even_ground(calm, &signs, &found, geometry, background);
+        // A fit to the pixels knows neither grains nor the mean of a lattice that changes.
+        let plain = found.change.is_none() && found.grains.is_empty();
+        let again = || on_even_ground(calm, &signs, &found, geometry, background);
+        let fine = plain.then(again).flatten();
         Some(fine.unwrap_or(found))
     })
 }
