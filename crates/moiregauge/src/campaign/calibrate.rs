@@ -437,6 +437,7 @@ fn about_scatter(name: &str, chi2: f64, freedom: usize, caveats: &mut Vec<Caveat
             SetDoubt::Scatter {
                 of: Scattered::KnownLattice,
                 chi2_per_dof: chi2 / freedom as f64,
+                share: None,
             },
             name,
         ));

@@ -16,10 +16,10 @@ use crate::scan::measured::MeasuredScan;
 use crate::settings::knobs::Settings;
 
 /// Lattices whose waves differ by more than this share along the fast axis are of different samples, or places:
-/// scanners repeat themselves better. Methods that read peaks off pixels have twice the room and more. See
-/// docs/constants.md.
+/// scanners repeat themselves better. See docs/constants.md.
 const APART: f64 = 0.01;
-/// The same for methods that read peaks off pixels, which are off by a per cent.
+/// The same for methods that read peaks off pixels, which are off by a per cent, and for frames of one place without position
+/// sensors: creep and hysteresis make 1 to 2 % between frames up and down, or between trace and retrace.
 const APART_ROUGHLY: f64 = 0.03;
 /// Differences below this many σ are noise, however large: none of all pairs of scans exceeds it by chance.
 const SIGMAS: f64 = 5.0;
@@ -94,12 +94,22 @@ struct Parts {
     apart: f64,
 }
 
-fn parts(scans: &[MeasuredScan], settings: &Settings) -> Parts {
-    let limit = if settings.method.is_joint() {
-        APART
-    } else {
-        APART_ROUGHLY
+/// Whether headers say that two scans show one place, and no position sensor says how the scanner moved: frames of one folder with dates
+/// that hold the middle of each other.
+fn are_of_one_place(a: &MeasuredScan, b: &MeasuredScan) -> bool {
+    let told = |scan: &MeasuredScan| {
+        let frame = &scan.lines.first()?.geometry;
+        let known = scan.acquired.is_some() && !frame.from_sensors;
+        known.then(|| (frame.centre(), frame.extent()))
     };
+    let (Some((one, extent)), Some((other, size))) = (told(a), told(b)) else {
+        return false;
+    };
+    let holds = |size: [f64; 2]| (one - other).norm() < 0.5 * size[0].min(size[1]);
+    folder(&a.file) == folder(&b.file) && holds(extent) && holds(size)
+}
+
+fn parts(scans: &[MeasuredScan], settings: &Settings) -> Parts {
     let views: Vec<(usize, View)> = scans
         .iter()
         .enumerate()
@@ -108,19 +118,24 @@ fn parts(scans: &[MeasuredScan], settings: &Settings) -> Parts {
         .collect();
     let mut parts: Vec<Vec<usize>> = Vec::new();
     let file = |view: usize| scans[views[view].0].file.as_str();
+    let apart = |a: usize, b: usize| {
+        let ((i, one), (k, other)) = (&views[a], &views[b]);
+        let roughly = !settings.method.is_joint() || are_of_one_place(&scans[*i], &scans[*k]);
+        one.apart(other, if roughly { APART_ROUGHLY } else { APART })
+    };
     for new in 0..views.len() {
         let like = |part: &Vec<usize>| {
             let mut known = part.iter();
-            known.any(|&k| views[k].1.apart(&views[new].1, limit) == 0.0)
+            known.any(|&k| apart(k, new) == 0.0)
         };
         let mut joined = vec![new];
         let mut others = Vec::new();
         for part in parts {
             // Grains of one scan are never one lattice, however little is known of them.
-            let apart = joined
+            let beside = joined
                 .iter()
                 .any(|&a| part.iter().any(|&b| file(a) == file(b)));
-            if like(&part) && !apart {
+            if like(&part) && !beside {
                 joined.extend(part);
             } else {
                 others.push(part);
@@ -129,10 +144,10 @@ fn parts(scans: &[MeasuredScan], settings: &Settings) -> Parts {
         others.push(joined);
         parts = others;
     }
-    let mut apart = f64::INFINITY;
+    let mut least = f64::INFINITY;
     for (i, first) in parts.iter().enumerate() {
         for second in &parts[i + 1..] {
-            apart = apart.min(views[first[0]].1.apart(&views[second[0]].1, limit));
+            least = least.min(apart(first[0], second[0]));
         }
     }
     for part in &mut parts {
@@ -142,7 +157,10 @@ fn parts(scans: &[MeasuredScan], settings: &Settings) -> Parts {
         part.sort_unstable();
     }
     parts.sort_unstable();
-    Parts { parts, apart }
+    Parts {
+        parts,
+        apart: least,
+    }
 }
 
 /// Makes sets of their own of scans that show different lattices, and says so; of grains those that are not wanted go. Also

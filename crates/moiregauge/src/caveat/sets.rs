@@ -51,12 +51,14 @@ pub enum SetDoubt {
         other: String,
     },
     /// Scans scatter by more than their errors.
-    #[error("{}", scattered(*.of, *.chi2_per_dof))]
+    #[error("{}", scattered(*.of, *.chi2_per_dof, *.share))]
     Scatter {
         /// Which scans.
         of: Scattered,
         /// χ² per degree of freedom.
         chi2_per_dof: f64,
+        /// By how much a length differs between scans at most, as a share of it.
+        share: Option<f64>,
     },
     /// A scan is far from the mean.
     #[error(
@@ -169,17 +171,24 @@ fn by_how_much(apart: f64) -> String {
     }
 }
 
-fn scattered(of: Scattered, chi2_per_dof: f64) -> String {
+fn scattered(of: Scattered, chi2_per_dof: f64, share: Option<f64>) -> String {
     let times = chi2_per_dof.sqrt();
+    let lengths = share.map_or_else(String::new, |share| {
+        format!(
+            ", and lengths differ by up to {:.1} % between scans",
+            100.0 * share
+        )
+    });
     match of {
         Scattered::Moires => format!(
             "the errors of the set were enlarged, since the scans scatter {times:.1} times more than their errors allow \
-         (χ²/dof = {chi2_per_dof:.1}). Possible causes: a drift that changes, an inhomogeneous lattice, errors of the \
-         sensors"
+             (χ²/dof = {chi2_per_dof:.1}){lengths}. Possible causes: a drift that changes, an inhomogeneous lattice, errors of \
+             the sensors"
         ),
         Scattered::KnownLattice => format!(
-            "the errors were enlarged, since the images scatter {times:.1} times more than their errors allow. Possible \
-         causes: a drift that changes, creep, or an inhomogeneous lattice"
+            "the errors were enlarged, since the images scatter {times:.1} times more than their errors allow{lengths}. \
+             Possible causes: a drift that changes, creep (along the slow axis it passes for drift), or an inhomogeneous \
+             lattice"
         ),
     }
 }

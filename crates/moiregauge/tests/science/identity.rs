@@ -247,6 +247,81 @@ fn atoms_have_a_lattice_of_all_scans() {
     }
 }
 
+/// Four frames of atoms up and down by a scanner without sensors; those down are 1.5 % longer along the lines, or show what `change` makes of them.
+fn creeping(change: &dyn Fn(&mut Simulation)) -> [Vec<Scan>; 2] {
+    let mut set = small_set(5);
+    set.sample.twist_deg = 60.0;
+    set.sample.strain_percent = 0.0;
+    set.sample.sharpness = 0.1;
+    set.raster.nominal_size_nm = [4.0; 2];
+    set.raster.sensors = false;
+    set.window.gain = [1.0; 2];
+    set.drift.velocity_nm_per_min = [0.3, -0.2];
+    let up = frames(&set).into_iter().step_by(2).collect();
+    change(&mut set);
+    let down = frames(&set).into_iter().skip(1).step_by(2).collect();
+    [up, down]
+}
+
+/// Creep makes no other sample of frames that their headers place on each other: they have one lattice, one drift and a scatter in per cent.
+#[test]
+fn creep_makes_no_samples() {
+    let [up, down] = creeping(&|set| set.window.gain = [1.015, 1.0]);
+    let found = analyse(measured("s", &[up, down].concat()), &quick());
+    assert_eq!(count(&found, "samples-separated"), 0, "{:?}", found.caveats);
+    let [set] = &found.sets[..] else {
+        panic!("{} sets", found.sets.len());
+    };
+    let drift = set.drift.as_ref().expect("frames up and down tell it");
+    for (i, truth) in [0.3, -0.2].into_iter().enumerate() {
+        let sigma = 60.0 * drift.covariance[(i, i)].sqrt();
+        let miss = 60.0 * drift.velocity[i] - truth;
+        assert!(miss.abs() < 3.0 * sigma, "{i}: {miss} ± {sigma}");
+    }
+    let lattice = set.lattice.as_ref().expect("atoms");
+    for length in &lattice.wavelengths {
+        assert!(
+            (length.value - 0.246).abs() < 2.0 * length.total,
+            "{length:?}"
+        );
+    }
+    let mut told = found.caveats.iter().filter(|c| c.code() == "scatter");
+    let told = told.next().expect("they scatter").message();
+    let per_cent = told
+        .split("by up to ")
+        .nth(1)
+        .and_then(|s| s.split(' ').next());
+    let per_cent: f64 = per_cent.expect("a share").parse().expect("a number");
+    assert!((0.9..1.8).contains(&per_cent), "{told}");
+}
+
+/// As large a difference is another sample where headers do not tell that the place is the same, and a grain that is turned always is.
+#[test]
+fn what_is_no_creep_is_another_sample() {
+    let longer = |set: &mut Simulation| set.window.gain = [1.015, 1.0];
+    let sets = |all: Vec<MeasuredScan>| {
+        let found = analyse(all, &quick());
+        assert_eq!(count(&found, "samples-separated"), 1);
+        found.sets.len()
+    };
+    let [up, down] = creeping(&longer);
+    let folders = [measured("s/a", &up), measured("s/b", &down)].concat();
+    assert_eq!(sets(folders), 2, "another folder");
+    let with = |change: &dyn Fn(&mut Scan)| {
+        let mut changed = down.clone();
+        changed.iter_mut().for_each(change);
+        measured("s", &[up.clone(), changed].concat())
+    };
+    assert_eq!(
+        sets(with(&|scan| scan.offset_nm = [3.0, 0.0])),
+        2,
+        "another place"
+    );
+    assert_eq!(sets(with(&|scan| scan.acquired = None)), 2, "no date");
+    let [up, turned] = creeping(&|set| set.sample.lattice_angle_deg += 3.0);
+    assert_eq!(sets(measured("s", &[up, turned].concat())), 2, "a grain");
+}
+
 /// Two samples make two sets, whatever their vectors are called, and no number is the mean of both.
 #[test]
 fn two_samples_are_two_sets() {

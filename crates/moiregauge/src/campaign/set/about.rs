@@ -1,6 +1,7 @@
 //! Caveats of a set: scatter, significance, scans that do not fit, readings.
 
-use crate::campaign::analysis::{SetAnalysis, SetMean};
+use crate::campaign::analysis::{ScanAnalysis, SetAnalysis, SetMean};
+use crate::campaign::set::mean::counted;
 use crate::campaign::set::moire;
 use crate::caveat::Caveat;
 use crate::caveat::moires::MoireDoubt;
@@ -21,6 +22,7 @@ pub(crate) fn about_set(
     settings: &Settings,
     caveats: &mut Vec<Caveat>,
 ) {
+    about_scatter(set, caveats);
     about_mean(&set.name, set.mean.as_ref(), caveats);
     let shown = set.mean.as_ref().or(set.uncorrected.as_ref());
     let ruler = set.ruler.as_ref();
@@ -76,17 +78,43 @@ fn about_readings(name: &str, mean: &SetMean, settings: &Settings) -> Vec<Caveat
     caveats(name, lattice, twist_strain, readings, settings)
 }
 
+/// Says where the scans scatter by more than their errors, and by how much.
+fn about_scatter(set: &SetAnalysis, caveats: &mut Vec<Caveat>) {
+    let moires = set
+        .mean
+        .as_ref()
+        .map(|mean| (mean.chi2_per_dof, Scattered::Moires));
+    let bare = set.lattice.as_ref();
+    let bare = bare.map(|found| (found.chi2_per_dof, Scattered::KnownLattice));
+    let Some((Some(chi2_per_dof), of)) = moires.or(bare) else {
+        return;
+    };
+    let lengths = |i: usize| {
+        let of = |scan: &ScanAnalysis| {
+            scan.drift_corrected
+                .unwrap_or(scan.sensor)
+                .wavelength(i)
+                .value
+        };
+        let all = || counted(&set.scans).map(of);
+        let [least, most] = [
+            all().fold(f64::INFINITY, f64::min),
+            all().fold(0.0, f64::max),
+        ];
+        most / least - 1.0
+    };
+    let doubt = SetDoubt::Scatter {
+        of,
+        chi2_per_dof,
+        share: Some((0..3).map(lengths).fold(0.0, f64::max)),
+    };
+    if chi2_per_dof > LARGE_CHI2 {
+        caveats.push(Caveat::new(doubt, &set.name));
+    }
+}
+
 fn about_mean(name: &str, mean: Option<&SetMean>, caveats: &mut Vec<Caveat>) {
     let Some(mean) = mean else { return };
-    if let Some(chi2_per_dof) = mean.chi2_per_dof.filter(|chi2| *chi2 > LARGE_CHI2) {
-        caveats.push(Caveat::new(
-            SetDoubt::Scatter {
-                of: Scattered::Moires,
-                chi2_per_dof,
-            },
-            name,
-        ));
-    }
     if !mean.within_one_percent {
         caveats.push(Caveat::new(SetDoubt::OutsideOnePercent, name));
     }
