@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{Matrix2, Vector2};
+use rayon::prelude::*;
 
 use crate::frame::image::Image;
 use crate::numbers::median::median;
@@ -83,7 +84,7 @@ impl Scene {
         };
         let longest = TAU / norms(coarse).into_iter().fold(f64::INFINITY, f64::min);
         let sigma = BACKGROUND * longest / binning as f64;
-        let background = gaussian_mean(&binned.values, columns, sigma);
+        let background = gaussian_mean(&binned.values, columns, sigma, &picked);
         let block: Vec<Option<usize>> = (0..binned.values.len()).map(block).collect();
         let without = |i: usize| block[i].map_or(0.0, |_| binned.values[i] - background[i]);
         let mut values: Vec<f64> = (0..binned.values.len()).map(without).collect();
@@ -120,53 +121,58 @@ impl Scene {
     }
 }
 
-/// Means weighted with a Gaussian of `sigma` over what is there.
-pub(crate) fn gaussian_mean(values: &[f64], columns: usize, sigma: f64) -> Vec<f64> {
+/// Means weighted with a Gaussian of `sigma` over what is there, in the `wanted` lines.
+pub(crate) fn gaussian_mean(
+    values: &[f64],
+    columns: usize,
+    sigma: f64,
+    wanted: &[bool],
+) -> Vec<f64> {
     let reach = (REACH * sigma).ceil() as usize;
     let taps: Vec<f64> = (0..=reach)
         .map(|i| (-0.5 * (i as f64 / sigma).powi(2)).exp())
         .collect();
-    // Sums of shifted copies, along a line and of lines.
     let shift = |output: &mut [f64], input: &[f64], tap: f64| {
         let each = output.iter_mut().zip(input);
         each.for_each(|(sum, value)| *sum += tap * value);
     };
-    let shifted = |output: &mut [f64], input: &[f64], step: usize| {
+    // Sums of shifted copies, of lines and then along a line.
+    let smooth = |input: &[f64], row: usize| {
+        let (mut line, mut both) = (vec![0.0; columns], vec![0.0; columns]);
         widest(
             #[inline(always)]
             || {
-                let count = input.len();
-                shift(output, input, taps[0]);
+                for (i, tap) in taps.iter().enumerate() {
+                    let others = [row.checked_sub(i), Some(row + i).filter(|_| i > 0)];
+                    for other in others.into_iter().flatten().filter(|y| *y < wanted.len()) {
+                        shift(&mut line, &input[other * columns..][..columns], *tap);
+                    }
+                }
+                shift(&mut both, &line, taps[0]);
                 for (i, tap) in taps.iter().enumerate().skip(1) {
-                    let off = (i * step).min(count);
-                    shift(&mut output[off..], &input[..count - off], *tap);
-                    shift(&mut output[..count - off], &input[off..], *tap);
+                    let off = i.min(columns);
+                    shift(&mut both[off..], &line[..columns - off], *tap);
+                    shift(&mut both[..columns - off], &line[off..], *tap);
                 }
             },
         );
-    };
-    let smooth = |input: &[f64]| {
-        let (mut lines, mut both) = (vec![0.0; input.len()], vec![0.0; input.len()]);
-        let each = lines
-            .chunks_exact_mut(columns)
-            .zip(input.chunks_exact(columns));
-        each.for_each(|(output, input)| shifted(output, input, 1));
-        shifted(&mut both, &lines, columns);
         both
     };
-    let there: Vec<f64> = values
-        .iter()
-        .map(|v| f64::from(u8::from(v.is_finite())))
-        .collect();
-    let filled: Vec<f64> = values
-        .iter()
-        .map(|v| if v.is_finite() { *v } else { 0.0 })
-        .collect();
-    let (sums, weights) = (smooth(&filled), smooth(&there));
-    sums.iter()
-        .zip(&weights)
-        .map(|(s, w)| if *w > 0.0 { s / w } else { 0.0 })
-        .collect()
+    let there = |v: &f64| f64::from(u8::from(v.is_finite()));
+    let there: Vec<f64> = values.iter().map(there).collect();
+    let filled = |v: &f64| if v.is_finite() { *v } else { 0.0 };
+    let filled: Vec<f64> = values.iter().map(filled).collect();
+    let mut means = vec![0.0; values.len()];
+    let lines = means.par_chunks_mut(columns.max(1)).zip(wanted).enumerate();
+    lines
+        .filter(|(_, (_, wanted))| **wanted)
+        .for_each(|(row, (means, _))| {
+            let (sums, weights) = (smooth(&filled, row), smooth(&there, row));
+            for ((mean, sum), weight) in means.iter_mut().zip(sums).zip(weights) {
+                *mean = if weight > 0.0 { sum / weight } else { 0.0 };
+            }
+        });
+    means
 }
 
 /// Clips at a multiple of the median absolute value: a spike is no more than a step.

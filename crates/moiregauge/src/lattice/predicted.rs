@@ -113,6 +113,13 @@ pub(crate) fn with_evidence(
     let own = found.reciprocal * binning;
     let proposals = candidates_beside(&own, &spectrum, &(geometry.pixel_to_nm * binning));
     let proposals: Vec<Matrix2<f64>> = proposals.iter().map(|c| c.pair / binning).collect();
+    // A cell of many atoms has many strong harmonics, and peaks of its own period are no rivals.
+    let rivals = if is_made_by_many(&found) {
+        0
+    } else {
+        Rivals::new(&spectrum).of(&own, &to_physical)
+    };
+    drop((spectrum, bins));
     let rows = table(part, &found.reciprocal, &proposals, bends).unwrap_or_default();
     let is_better = |row: &&Row| {
         let weakest = || weakest(part, &row.pair, bends);
@@ -129,12 +136,6 @@ pub(crate) fn with_evidence(
         behind: -better,
     });
     let doubtful = doubtful.map(|row| Candidate::new(&row, &to_physical));
-    // A cell of many atoms has many strong harmonics, and peaks of its own period are no rivals.
-    let rivals = if is_made_by_many(&found) {
-        0
-    } else {
-        Rivals::new(&spectrum).of(&own, &to_physical)
-    };
     found.evidence = Some(Evidence {
         predicts: weakest(part, &found.reciprocal, bends),
         rivals,

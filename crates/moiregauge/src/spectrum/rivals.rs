@@ -4,6 +4,8 @@
 //! of about its period is as strong as its weakest one. That needs no model of the noise, only the rank of a peak.
 
 use nalgebra::{Matrix2, Vector2};
+use rayon::prelude::*;
+use rustfft::num_complex::Complex64;
 
 use crate::numbers::interrupt;
 use crate::numbers::three::three;
@@ -31,24 +33,28 @@ pub(crate) struct Rivals<'a> {
 
 impl<'a> Rivals<'a> {
     pub(crate) fn new(spectrum: &'a Spectrum) -> Self {
-        let (half, rows) = (spectrum.half() as i64, spectrum.rows as i64);
+        let (half, rows) = (spectrum.half(), spectrum.rows as i64);
         let step = spectrum.step();
-        let lines = (LOBE * spectrum.columns as f64 / spectrum.image_size[0] as f64).ceil() as i64;
-        let mut peaks = Vec::new();
-        for y in -rows / 2..(rows + 1) / 2 {
+        let lines =
+            (LOBE * spectrum.columns as f64 / spectrum.image_size[0] as f64).ceil() as usize;
+        let of_line = |y: i64| {
             interrupt::check();
-            for x in lines..half - 1 {
-                let power = power(spectrum, x, y);
-                let around = (-1..=1).flat_map(|dy| (-1..=1).map(move |dx| (x + dx, y + dy)));
-                if around
-                    .into_iter()
-                    .all(|(x, y)| self::power(spectrum, x, y) <= power)
-                {
-                    let q = step.component_mul(&Vector2::new(x as f64, y as f64));
-                    peaks.push((q, power));
-                }
-            }
-        }
+            let near = [y, y - 1, y + 1].map(|y| {
+                let first = y.rem_euclid(rows) as usize * half;
+                &spectrum.values[first..first + half]
+            });
+            (lines..half - 1).filter_map(move |x| {
+                let power = near[0][x].norm_sqr();
+                let is_lower = |other: &Complex64| other.norm_sqr() <= power;
+                let is_peak = near
+                    .iter()
+                    .all(|line| line[x - 1..=x + 1].iter().all(is_lower));
+                let q = || step.component_mul(&Vector2::new(x as f64, y as f64));
+                is_peak.then(|| (q(), power))
+            })
+        };
+        let all = (-rows / 2..(rows + 1) / 2).into_par_iter();
+        let peaks = all.flat_map_iter(of_line).collect();
         Self { spectrum, peaks }
     }
 
@@ -75,8 +81,11 @@ impl<'a> Rivals<'a> {
             let like = stronger.filter(|(q, _)| (least..most).contains(&length(*q)));
             like.filter(|(q, _)| !is_own(q)).count()
         };
-        let all = (1..=SHELLS).map(|n| of_shell(&shells(n)[shells(n - 1).len()..]));
-        all.min().unwrap_or(0)
+        let fewest = (1..=SHELLS).try_fold(usize::MAX, |fewest, n| {
+            let shell = &shells(n)[shells(n - 1).len()..];
+            (fewest > 0).then(|| fewest.min(of_shell(shell)))
+        });
+        fewest.unwrap_or(0)
     }
 
     /// The peaks outside a lattice's first order (reciprocal pair, rad per pixel).

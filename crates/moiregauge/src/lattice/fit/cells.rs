@@ -160,7 +160,12 @@ impl Fit<'_> {
         let per_pixel = frame.edge().map(|edge| 1.0 / edge);
         let waves = three(&model.pair).map(|p| p.component_mul(&per_pixel).norm());
         let longest = TAU / waves.into_iter().fold(f64::INFINITY, f64::min);
-        let ground = gaussian_mean(&rest, columns, GROUND * longest);
+        let ground = gaussian_mean(
+            &rest,
+            columns,
+            GROUND * longest,
+            &vec![true; frame.image.rows],
+        );
         rest.iter_mut()
             .zip(ground)
             .for_each(|(value, ground)| *value -= ground);
