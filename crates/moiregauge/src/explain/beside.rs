@@ -48,9 +48,10 @@ impl Scene {
             own.map(|(_, power)| *power).fold(0.0, f64::max)
         });
         let least = of_first.fold(f64::INFINITY, f64::min);
+        let lattices = [pair, strong].map(|pair| (*pair, pair.try_inverse()));
         let strongest = |powers: &[(Vector2<f64>, f64)]| {
             let is_other = |q: &Vector2<f64>| {
-                self.to_nearest(q, pair) > LOBE && self.to_nearest(q, strong) > SKIRT
+                self.to_nearest(q, &lattices[0]) > LOBE && self.to_nearest(q, &lattices[1]) > SKIRT
             };
             let stands_out = |(q, power): &&(Vector2<f64>, f64)| {
                 let around = powers
@@ -61,6 +62,11 @@ impl Scene {
             };
             let enough = powers.iter().filter(|(_, power)| *power > least);
             let mut others: Vec<_> = enough.filter(|(q, _)| is_other(q)).collect();
+            let mut sizes: Vec<f64> = others.iter().map(|(_, power)| *power).collect();
+            if let Some(beyond) = sizes.len().checked_sub(LOOKED_AT) {
+                let least = *sizes.select_nth_unstable_by(beyond, f64::total_cmp).1;
+                others.retain(|(_, power)| *power >= least);
+            }
             others.sort_by(|a, b| b.1.total_cmp(&a.1));
             let mut others = others.into_iter().take(LOOKED_AT);
             others.find(stands_out).map(|(q, _)| *q)
@@ -94,11 +100,13 @@ impl Scene {
         self
     }
 
-    /// Distance of a wave vector from the nearest point of a lattice (rad per bin), cycles per frame.
-    fn to_nearest(&self, q: &Vector2<f64>, pair: &Matrix2<f64>) -> f64 {
-        let nearest = pair
-            .try_inverse()
-            .map(|inverse| pair * (inverse * q).map(f64::round));
+    /// Distance of a wave vector from the nearest point of a lattice (reciprocal pair, rad per bin, and its inverse), cycles per frame.
+    fn to_nearest(
+        &self,
+        q: &Vector2<f64>,
+        (pair, inverse): &(Matrix2<f64>, Option<Matrix2<f64>>),
+    ) -> f64 {
+        let nearest = inverse.map(|inverse| pair * (inverse * q).map(f64::round));
         nearest.map_or(0.0, |nearest| self.cycles(q - nearest))
     }
 

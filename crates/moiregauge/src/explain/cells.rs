@@ -3,6 +3,7 @@
 //! The lattice with the larger cell (a superlattice) has all wave vectors of the other and more between them. It is taken where these predict pixels
 //! that they have not seen, in all three directions, and lie on its points: a second moiré that only comes near them does not belong to it.
 
+use std::cell::OnceCell;
 use std::f64::consts::TAU;
 
 use heterostrain::lattice::shortest_pair;
@@ -95,12 +96,13 @@ pub(crate) fn better_cell(image: &Image, pair: &Matrix2<f64>) -> Nested {
         .clone()
         .filter_map(|supercell| Some((supercell, supercell.coarse(pair)?)));
     let shown = coarse.find(|(supercell, coarse)| is_shown(coarse, *supercell));
+    let own = OnceCell::new();
     let better = shown.or_else(|| {
         let mut fine = all.map(|supercell| (supercell, supercell.fine(pair)));
         fine.find(|(supercell, fine)| {
             // Moirés of hexagonal layers are nearly hexagons: half-order waves in one direction make a superlattice of one.
             let is_regular = elongated && !is_elongated(fine);
-            predicts_as_well(image, fine, pair) == Some(true)
+            predicts_as_well(image, fine, *own.get_or_init(|| gain(image, pair))) == Some(true)
                 && (is_regular || !is_shown(pair, *supercell))
         })
     });
@@ -118,9 +120,9 @@ fn is_elongated(pair: &Matrix2<f64>) -> bool {
     waves.into_iter().fold(0.0, f64::max) > ELONGATED * shortest
 }
 
-/// Whether one lattice alone predicts most of what another does.
-fn predicts_as_well(image: &Image, one: &Matrix2<f64>, other: &Matrix2<f64>) -> Option<bool> {
-    let enough = gain(image, one)? > MOST * gain(image, other)?;
+/// Whether one lattice alone predicts most of what another does, the share `other` of the variance.
+fn predicts_as_well(image: &Image, one: &Matrix2<f64>, other: Option<f64>) -> Option<bool> {
+    let enough = gain(image, one)? > MOST * other?;
     Some(enough && weakest(image, one, false)? > BETTER)
 }
 

@@ -136,42 +136,62 @@ pub(crate) fn gaussian_mean(
         let each = output.iter_mut().zip(input);
         each.for_each(|(sum, value)| *sum += tap * value);
     };
-    // Sums of shifted copies, of lines and then along a line.
-    let smooth = |input: &[f64], row: usize| {
-        let (mut line, mut both) = (vec![0.0; columns], vec![0.0; columns]);
+    // Sums of shifted copies, along lines and then of lines.
+    let along = |input: &[f64]| {
+        let mut lines = vec![0.0; input.len()];
+        let each = lines.par_chunks_mut(columns).zip(input.par_chunks(columns));
+        each.for_each(|(output, input)| {
+            widest(
+                #[inline(always)]
+                || {
+                    shift(output, input, taps[0]);
+                    for (i, tap) in taps.iter().enumerate().skip(1) {
+                        let off = i.min(columns);
+                        shift(&mut output[off..], &input[..columns - off], *tap);
+                        shift(&mut output[..columns - off], &input[off..], *tap);
+                    }
+                },
+            );
+        });
+        lines
+    };
+    // One line stands for all where they are alike.
+    let up = |lines: &[f64], row: usize| {
+        let mut sums = vec![0.0; columns];
         widest(
             #[inline(always)]
             || {
                 for (i, tap) in taps.iter().enumerate() {
                     let others = [row.checked_sub(i), Some(row + i).filter(|_| i > 0)];
                     for other in others.into_iter().flatten().filter(|y| *y < wanted.len()) {
-                        shift(&mut line, &input[other * columns..][..columns], *tap);
+                        let line = lines.chunks_exact(columns).nth(other);
+                        shift(&mut sums, line.unwrap_or(&lines[..columns]), *tap);
                     }
-                }
-                shift(&mut both, &line, taps[0]);
-                for (i, tap) in taps.iter().enumerate().skip(1) {
-                    let off = i.min(columns);
-                    shift(&mut both[off..], &line[..columns - off], *tap);
-                    shift(&mut both[..columns - off], &line[off..], *tap);
                 }
             },
         );
-        both
+        sums
     };
     let there = |v: &f64| f64::from(u8::from(v.is_finite()));
-    let there: Vec<f64> = values.iter().map(there).collect();
     let filled = |v: &f64| if v.is_finite() { *v } else { 0.0 };
-    let filled: Vec<f64> = values.iter().map(filled).collect();
+    let (all, there) = if values.iter().all(|v| v.is_finite()) {
+        (along(values), along(&vec![1.0; columns]))
+    } else {
+        let [filled, there] = [
+            values.iter().map(filled).collect::<Vec<f64>>(),
+            values.iter().map(there).collect(),
+        ];
+        (along(&filled), along(&there))
+    };
     let mut means = vec![0.0; values.len()];
-    let lines = means.par_chunks_mut(columns.max(1)).zip(wanted).enumerate();
-    lines
-        .filter(|(_, (_, wanted))| **wanted)
-        .for_each(|(row, (means, _))| {
-            let (sums, weights) = (smooth(&filled, row), smooth(&there, row));
-            for ((mean, sum), weight) in means.iter_mut().zip(sums).zip(weights) {
-                *mean = if weight > 0.0 { sum / weight } else { 0.0 };
-            }
-        });
+    let lines = means.par_chunks_mut(columns).zip(wanted).enumerate();
+    let lines = lines.filter(|(_, (_, wanted))| **wanted);
+    lines.for_each(|(row, (means, _))| {
+        let (sums, weights) = (up(&all, row), up(&there, row));
+        for ((mean, sum), weight) in means.iter_mut().zip(sums).zip(weights) {
+            *mean = if weight > 0.0 { sum / weight } else { 0.0 };
+        }
+    });
     means
 }
 

@@ -117,7 +117,7 @@ pub(crate) fn with_evidence(
     let rivals = if is_made_by_many(&found) {
         0
     } else {
-        Rivals::new(&spectrum).of(&own, &to_physical)
+        Rivals::new(&spectrum).of(&own, &to_physical, usize::MAX)
     };
     drop((spectrum, bins));
     let rows = table(part, &found.reciprocal, &proposals, bends).unwrap_or_default();

@@ -39,18 +39,17 @@ impl<'a> Rivals<'a> {
             (LOBE * spectrum.columns as f64 / spectrum.image_size[0] as f64).ceil() as usize;
         let of_line = |y: i64| {
             interrupt::check();
-            let near = [y, y - 1, y + 1].map(|y| {
-                let first = y.rem_euclid(rows) as usize * half;
-                &spectrum.values[first..first + half]
-            });
+            let powers = |y: i64| {
+                let line = &spectrum.values[y.rem_euclid(rows) as usize * half..][..half];
+                line.iter().map(Complex64::norm_sqr)
+            };
+            let own: Vec<f64> = powers(y).collect();
+            let beside = powers(y - 1).zip(powers(y + 1)).zip(&own);
+            let highest: Vec<f64> = beside.map(|((a, b), own)| a.max(b).max(*own)).collect();
             (lines..half - 1).filter_map(move |x| {
-                let power = near[0][x].norm_sqr();
-                let is_lower = |other: &Complex64| other.norm_sqr() <= power;
-                let is_peak = near
-                    .iter()
-                    .all(|line| line[x - 1..=x + 1].iter().all(is_lower));
+                let is_peak = highest[x - 1..=x + 1].iter().all(|other| *other <= own[x]);
                 let q = || step.component_mul(&Vector2::new(x as f64, y as f64));
-                is_peak.then(|| (q(), power))
+                is_peak.then(|| (q(), own[x]))
             })
         };
         let all = (-rows / 2..(rows + 1) / 2).into_par_iter();
@@ -59,8 +58,8 @@ impl<'a> Rivals<'a> {
     }
 
     /// How many peaks beside a lattice (reciprocal pair, rad per pixel) have about the period of one of its first five shells and at least the power
-    /// of the weakest wave of that: those of the shell that has the fewest. `to_physical`: the metric of wave vectors.
-    pub(crate) fn of(&self, pair: &Matrix2<f64>, to_physical: &Matrix2<f64>) -> usize {
+    /// of the weakest wave of that: those of the shell that has the fewest, of each shell no more than `most`. `to_physical`: the metric of wave vectors.
+    pub(crate) fn of(&self, pair: &Matrix2<f64>, to_physical: &Matrix2<f64>, most: usize) -> usize {
         let Some(inverse) = pair.try_inverse() else {
             return 0;
         };
@@ -76,10 +75,10 @@ impl<'a> Rivals<'a> {
             let waves = || shell.iter().map(|index| wave(*index));
             let weakest = waves().map(|q| self.near(q)).fold(f64::INFINITY, f64::min);
             let least = waves().map(length).fold(f64::INFINITY, f64::min) / LIKE;
-            let most = waves().map(length).fold(0.0, f64::max) * LIKE;
+            let longest = waves().map(length).fold(0.0, f64::max) * LIKE;
             let stronger = self.peaks.iter().filter(|(_, power)| *power >= weakest);
-            let like = stronger.filter(|(q, _)| (least..most).contains(&length(*q)));
-            like.filter(|(q, _)| !is_own(q)).count()
+            let like = stronger.filter(|(q, _)| (least..longest).contains(&length(*q)));
+            like.filter(|(q, _)| !is_own(q)).take(most).count()
         };
         let fewest = (1..=SHELLS).try_fold(usize::MAX, |fewest, n| {
             let shell = &shells(n)[shells(n - 1).len()..];
@@ -144,7 +143,7 @@ mod tests {
         };
         let values = (0..SIZE[0] * SIZE[1]).map(value).collect();
         let spectrum = Spectrum::new(&Image::new(SIZE[1], SIZE[0], values));
-        Rivals::new(&spectrum).of(&pair(), &Matrix2::identity())
+        Rivals::new(&spectrum).of(&pair(), &Matrix2::identity(), usize::MAX)
     }
 
     fn turned(degrees: f64) -> Vector2<f64> {

@@ -109,7 +109,7 @@ fn distinct<'a>(
     // A cell of many atoms explains many peaks; single shells of it need not stand out.
     by_score(found, spectrum, |candidate| {
         let rivals = ranked.get_or_init(&rivals);
-        well_explained(candidate) || rivals.of(&candidate.pair, &to_physical) < ENOUGH
+        well_explained(candidate) || rivals.of(&candidate.pair, &to_physical, ENOUGH) < ENOUGH
     })
 }
 
