@@ -26,24 +26,21 @@ const NETCDF: &str =
     "a NetCDF file without an image of GXSM: save the image as Gwyddion, TIFF or NumPy array";
 /// Words of the programs that write HDF5 files, within the first bytes; the last one is in none.
 const PROGRAMS_OF_HDF5: [(&[u8], &str); 5] = [
-    (
-        b"jpk",
-        "an HDF5 file of a JPK instrument (.h5-jpk): save the image as JPK (.jpk) or TIFF",
-    ),
-    (
-        b"JPK",
-        "an HDF5 file of a JPK instrument (.h5-jpk): save the image as JPK (.jpk) or TIFF",
-    ),
+    (b"jpk-", JPK),
+    (b"Measurement_0", JPK),
+    (b"IGOR", "an HDF5 file of Igor: save the wave as .ibw"),
     (
         b"NX_class",
         "a NeXus file (HDF5): save the image as Gwyddion, TIFF or NumPy array",
     ),
-    (b"IGOR", "an HDF5 file of Igor: save the wave as .ibw"),
     (
         b"",
         "an HDF5 file: save the image as Gwyddion, TIFF or NumPy array",
     ),
 ];
+const JPK: &str =
+    "an HDF5 file of a JPK instrument (.h5-jpk): save the image as JPK (.jpk) or TIFF";
+
 /// A file of a high-speed AFM: version 1, a header of 1 to 65535 bytes, 32 bytes for each frame, Japanese text.
 fn is_asd(bytes: &[u8]) -> bool {
     matches!(
@@ -57,24 +54,33 @@ fn other(bytes: &[u8]) -> Option<&'static str> {
     if is_asd(bytes) {
         return Some("a film of a high-speed AFM (.asd): save frames as Gwyddion or TIFF");
     }
-    if bytes.starts_with(HDF5) {
-        let head = head_of_hdf5(bytes);
-        let by = |word: &[u8]| word.is_empty() || memchr::memmem::find(head, word).is_some();
-        return PROGRAMS_OF_HDF5
-            .iter()
-            .find(|(word, _)| by(word))
-            .map(|(_, found)| *found);
+    if let Some((_, found)) = program_of_hdf5(bytes) {
+        return Some(found);
     }
     let (_, found) = OTHERS.iter().find(|(magic, _)| bytes.starts_with(magic))?;
     Some(found)
 }
 
+/// Which program wrote an HDF5 file: its word, and what to do.
+fn program_of_hdf5(bytes: &[u8]) -> Option<&'static (&'static [u8], &'static str)> {
+    let head = head_of_hdf5(bytes)?;
+    let by = |word: &[u8]| word.is_empty() || memchr::memmem::find(head, word).is_some();
+    PROGRAMS_OF_HDF5.iter().find(|(word, _)| by(word))
+}
+
+/// An HDF5 file of no program that has a layout of its own.
+#[cfg(all(feature = "hdf5", not(target_family = "wasm")))]
+pub(crate) fn is_plain_hdf5(bytes: &[u8]) -> bool {
+    program_of_hdf5(bytes).is_some_and(|(word, _)| word.is_empty() || *word == b"NX_class")
+}
+
 /// What HDF5 files begin with.
-pub(crate) const HDF5: &[u8] = b"\x89HDF\r\n\x1a\n";
+const HDF5: &[u8] = b"\x89HDF\r\n\x1a\n";
 
 /// The bytes in which names of groups of an HDF5 file stand, mostly.
-pub(crate) fn head_of_hdf5(bytes: &[u8]) -> &[u8] {
-    &bytes[..bytes.len().min(1 << 20)]
+pub(crate) fn head_of_hdf5(bytes: &[u8]) -> Option<&[u8]> {
+    let head = &bytes[..bytes.len().min(1 << 20)];
+    head.starts_with(HDF5).then_some(head)
 }
 
 /// Tells the format from the first bytes of a file; a few hundred are enough but for TIFF files,

@@ -28,6 +28,8 @@ pub enum Format {
     JpkZip,
     /// JPK images in HDF5 (`.h5-jpk`).
     JpkHdf5,
+    /// Images of `NeXus`, or a single array, in HDF5 (`.nxs`, `.h5`).
+    Hdf5,
     /// Nanosurf (`.nid`).
     Nid,
     /// Park Systems (`.tiff`), a TIFF container.

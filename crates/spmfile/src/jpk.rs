@@ -107,8 +107,8 @@ pub(crate) fn detect_zip(bytes: &[u8]) -> bool {
 /// An HDF5 file of the maker.
 #[cfg(all(feature = "hdf5", not(target_family = "wasm")))]
 pub(crate) fn detect_hdf5(bytes: &[u8]) -> bool {
-    bytes.starts_with(crate::detect::HDF5)
-        && memchr::memmem::find(crate::detect::head_of_hdf5(bytes), b"Measurement_0").is_some()
+    let head = crate::detect::head_of_hdf5(bytes);
+    head.is_some_and(|head| memchr::memmem::find(head, b"Measurement_0").is_some())
 }
 
 /// Reads the headers and finds the samples.

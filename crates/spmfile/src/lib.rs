@@ -44,6 +44,8 @@ pub mod gsf;
 pub mod gwy;
 mod gxsm;
 pub mod gxyzf;
+#[cfg(all(feature = "hdf5", not(target_family = "wasm")))]
+mod hdf5;
 mod header;
 mod igor;
 mod iso28632;

@@ -111,6 +111,8 @@ pub(crate) static READERS: &[Reader] = &[
     reader!(F::JpkZip, "JPK archive", ["jpk-qi-data", "jpk-force-map", "jpk-force"], own [], By(jpk::detect_zip), Scan, flat false, open_jpk_zip),
     #[cfg(all(feature = "hdf5", not(target_family = "wasm")))]
     reader!(F::JpkHdf5, "JPK in HDF5", ["h5-jpk"], own ["h5-jpk"], By(jpk::detect_hdf5), Scan, flat false, jpk::hdf5::open),
+    #[cfg(all(feature = "hdf5", not(target_family = "wasm")))]
+    reader!(F::Hdf5, "HDF5", ["nxs", "h5", "hdf5"], own [], By(crate::detect::is_plain_hdf5), Array, flat false, array::nexus::open),
     reader!(F::Rhk, "RHK", ["sm4"], own ["sm2", "sm3", "sm4"], By(rhk::detect), Scan, flat false, rhk::open),
     reader!(F::ParkTiff, "Park", ["tiff"], own [], By(park::detect), Scan, flat false, park::open),
     reader!(F::Jpk, "JPK", ["jpk", "jpk-qi-image"], own ["jpk", "jpk-qi-image"], By(jpk::detect), Scan, flat false, jpk::open),

@@ -5,6 +5,8 @@ mod archived;
 mod axis;
 #[cfg(feature = "pictures")]
 mod calibration;
+#[cfg(all(feature = "hdf5", not(target_family = "wasm")))]
+pub(crate) mod nexus;
 mod npy;
 #[cfg(feature = "pictures")]
 mod picture;

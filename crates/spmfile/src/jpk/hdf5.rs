@@ -5,19 +5,20 @@
 //! count × `net-encoder.scaling.multiplier` + `net-encoder.scaling.offset`.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
-use hdf5_pure::{AttrValue, DType, Dataset, Error, File, Group};
+use hdf5_pure::{AttrValue, Error, File, Group};
 
 use super::centre;
 use crate::error::ReadError;
+use crate::hdf5::{Array, View, text};
 use crate::header::ChannelHeader;
 use crate::limits::unpacked_limit;
 use crate::outline::{Input, Outline};
-use crate::scan::{ChannelInfo, LineDirection, Samples, Scan, UnreadableChannel};
+use crate::scan::{ChannelInfo, LineDirection, Scan, UnreadableChannel};
 use crate::stored::{Failure, Stored, Unpacked};
 use crate::whole::{MOST_CHANNELS, some_readable};
-use crate::words::{self, Unread};
+use crate::words::Unread;
 
 const FORMAT: &str = "JPK in HDF5";
 /// What every scan says.
@@ -201,32 +202,12 @@ impl Attributes {
     }
 }
 
-/// A value as it is written; nothing of several.
-fn text(value: &AttrValue) -> Option<String> {
-    use AttrValue as A;
-    macro_rules! number {
-        ($($one:ident $some:ident),*) => {
-            match value {
-                $(A::$one(n) => Some(n.to_string()),
-                A::$some(all) => all.first().filter(|_| all.len() == 1).map(ToString::to_string),)*
-                other => Some(words::one_line(other.as_str()?)),
-            }
-        };
-    }
-    number!(
-        F32 F32Array, F64 F64Array, I8 I8Array, I16 I16Array, I32 I32Array, I64 I64Array, U8 U8Array, U16 U16Array,
-        U32 U32Array, U64 U64Array
-    )
-}
-
 /// The frames of a channel.
 struct Film {
-    array: Dataset,
+    array: Array,
     rows: usize,
     columns: usize,
     frames: usize,
-    /// All of them, once one was wanted.
-    whole: OnceLock<Result<Samples, String>>,
 }
 
 /// The array of a channel: the one of its name, else the first.
@@ -242,82 +223,35 @@ fn film(
     let name = names
         .first()
         .ok_or("expected an array of its samples, found none")?;
-    let array = group.dataset(name).map_err(words)?;
-    let shape = array.shape().map_err(words)?;
+    let array = Array::of(group.dataset(name).map_err(words)?, room)?;
     let pixels = rows as u64 * columns as u64;
-    let frames = match shape[..] {
+    let frames = match array.shape[..] {
         [found] if found == pixels => 1,
-        [found, frames] if found == pixels => frames,
+        [found, frames] if found == pixels => frames as usize,
         _ => {
+            let shape = &array.shape;
             return Err(format!(
                 "expected an array of {rows} x {columns} pixels × frames, found {shape:?}"
             ));
         }
     };
-    let chunk = array.chunk_shape().map_err(words)?;
-    let stored = match chunk {
-        Some(chunk) => {
-            let chunks = array.chunks().map_err(words)?.len() as u64;
-            chunk
-                .iter()
-                .fold(chunks, |all, &side| all.saturating_mul(side))
-        }
-        None => u64::MAX,
-    };
-    let samples = pixels.saturating_mul(frames);
-    let length = samples.saturating_mul(array.element_size().map_err(words)?);
-    let left = room
-        .checked_sub(length)
-        .filter(|_| (1..=stored).contains(&samples));
-    *room = left.ok_or_else(|| {
-        format!("expected as many samples in the file as in its array, {shape:?}")
-    })?;
     Ok(Film {
         array,
         rows,
         columns,
-        frames: frames as usize,
-        whole: OnceLock::new(),
+        frames,
     })
 }
 
 impl Film {
-    fn whole(&self) -> Result<Samples, String> {
-        let kind = self.array.dtype().map_err(|error| error.to_string())?;
-        let read = match kind {
-            DType::I8 | DType::U8 | DType::I16 => self.array.read_i16().map(Samples::I16),
-            DType::U16 | DType::I32 => self.array.read_i32().map(Samples::I32),
-            DType::F32 => self.array.read_f32().map(Samples::F32),
-            DType::F64 | DType::U32 | DType::I64 | DType::U64 => {
-                self.array.read_f64().map(Samples::F64)
-            }
-            other => return Err(format!("expected numbers, found {other}")),
-        };
-        read.map_err(|error| error.to_string())
-    }
-
     /// One frame.
     fn image(&self, frame: usize) -> Result<Unpacked, Failure> {
-        let whole = self.whole.get_or_init(|| self.whole());
-        let whole = whole
-            .as_ref()
-            .map_err(|error| Failure::channel(error.clone()))?;
-        let (pixels, frames) = (self.rows * self.columns, self.frames);
-        if whole.len() != pixels * frames {
-            let found = whole.len();
-            return Err(Failure::Lost(format!(
-                "{found} of its {} samples are there",
-                pixels * frames
-            )));
-        }
-        macro_rules! samples {
-            ($($kind:ident),*) => {
-                match whole {
-                    $(Samples::$kind(all) => Samples::$kind(all[frame..].iter().step_by(frames).copied().collect()),)*
-                }
-            };
-        }
-        Ok(Unpacked::measured(samples!(I16, I32, F32, F64)))
+        self.array.image(&View {
+            rows: self.rows,
+            columns: self.columns,
+            start: frame,
+            steps: [self.columns * self.frames, self.frames].map(|step| step as isize),
+        })
     }
 }
 

@@ -134,8 +134,7 @@ fn other_files_of_controllers_are_named() {
         (b"[ParVERT30]\r\n", "Createc"),
         (b"CDF\x02\0\0\0\0", "GXSM"),
         (b"\x89HDF\r\n\x1a\n\0\0\0jpk-force", ".jpk"),
-        (b"\x89HDF\r\n\x1a\n\0\0\0NX_class", "NeXus"),
-        (b"\x89HDF\r\n\x1a\n\0\0\0", "HDF5"),
+        (b"\x89HDF\r\n\x1a\n\0\0\0IGORWaveType", "Igor"),
     ] {
         let error = read(head).expect_err("no image");
         assert!(matches!(error, ReadError::OtherFormat { .. }), "{error}");

@@ -60,9 +60,14 @@ pub(crate) fn samples(data: &Path) -> Vec<Sample> {
         .iter()
         .filter(|p| p.is_dir())
         .flat_map(|f| entries(f));
-    let made = ["jpk/hdf5/film.h5-jpk", "gxsm/scan.nc"];
+    let made = [
+        "jpk/hdf5/film.h5-jpk",
+        "gxsm/scan.nc",
+        "array/nexus/scan.nxs",
+        "array/nexus/array.h5",
+    ];
     let made = made.map(|name| Path::new(env!("CARGO_MANIFEST_DIR")).join("src").join(name));
-    files
+    let read = files
         .chain(made)
         .filter(|path| path.extension().is_none_or(|e| e != "json" && e != "md"))
         .filter(|path| path.is_file())
@@ -72,13 +77,38 @@ pub(crate) fn samples(data: &Path) -> Vec<Sample> {
             if is_text(&bytes) {
                 bytes.truncate(LONGEST_TEXT);
             }
-            Sample {
-                name: name.into_owned(),
-                hot: hot(&bytes),
-                bytes,
-            }
+            (name.into_owned(), bytes)
+        });
+    read.chain([("grid.3ds".to_owned(), grid())])
+        .map(|(name, bytes)| Sample {
+            name,
+            hot: hot(&bytes),
+            bytes,
         })
         .collect()
+}
+
+/// A grid of 4 × 3 spectra of 8 points, of which no real file is at hand.
+fn grid() -> Vec<u8> {
+    let header = "Grid dim=\"4 x 3\"\r\nGrid settings=1.0E-7;-2.0E-8;4.0E-8;3.0E-8;3.0E+1\r\nFiletype=Linear\r\n\
+        Sweep Signal=\"Bias (V)\"\r\nFixed parameters=\"Sweep Start;Sweep End\"\r\nExperiment parameters=\"X (m);Y (m);Z (m)\"\r\n\
+        # Parameters (4 byte)=5\r\nExperiment size (bytes)=64\r\nPoints=8\r\nChannels=\"Current (A);LI Demod 1 X (V)\"\r\n\
+        Start time=\"24.10.2021 20:44:06\"\r\n:HEADER_END:\r\n";
+    let place = |n: usize| {
+        [
+            1e-8 * (n % 4) as f32,
+            1e-8 * (n / 4) as f32,
+            1e-10 * n as f32,
+        ]
+    };
+    let point = |n: usize| {
+        [-0.5, 0.5]
+            .into_iter()
+            .chain(place(n))
+            .chain((0..16).map(|k| k as f32))
+    };
+    let numbers = (0..12).flat_map(point).flat_map(f32::to_be_bytes);
+    header.bytes().chain(numbers).collect()
 }
 
 fn entries(folder: &Path) -> Vec<PathBuf> {

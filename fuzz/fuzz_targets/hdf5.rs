@@ -1,0 +1,3 @@
+#![no_main]
+
+spmfile_fuzz::reader!(spmfile::Format::Hdf5);
