@@ -1,6 +1,6 @@
 //! The files were written by another program: see `scan.py`.
 
-use crate::{Format, Scan, read};
+use crate::{Format, Scan, WritableFormat, read};
 
 const SCAN: &[u8] = include_bytes!("scan.nxs");
 const ARRAY: &[u8] = include_bytes!("array.h5");
@@ -25,7 +25,7 @@ fn positions_tell_where_samples_are() {
     let scan = scan();
     let expected = [
         ("topography", "nm", 0),
-        ("current", "pA", 0),
+        ("current", "A", 0),
         ("didv (bias -0.5 V)", "S", 0),
         ("didv (bias 0.1 V)", "S", 1),
     ];
@@ -39,6 +39,19 @@ fn positions_tell_where_samples_are() {
         assert!((across - 2.0).abs() + (up - 3.0).abs() < 1e-9, "{name}");
     }
     assert_eq!(scan.notes, [super::UNTESTED]);
+    let files = crate::write(&scan, WritableFormat::Gwy, "scan", &[]).expect("a container");
+    let again = read(&files[0].1).expect("whole");
+    assert_eq!(again.channels.len(), scan.channels.len());
+    for (read, written) in again.channels.iter().zip(&scan.channels) {
+        assert_eq!((&read.name, &read.unit), (&written.name, &written.unit));
+        // Containers hold values in metres and the like.
+        let pairs = read.values().into_iter().zip(written.values());
+        assert!(
+            pairs
+                .into_iter()
+                .all(|(a, b)| (a - b).abs() <= 1e-9 * b.abs())
+        );
+    }
     let [curve] = &scan.unreadable[..] else {
         panic!("{:?}", scan.unreadable);
     };
