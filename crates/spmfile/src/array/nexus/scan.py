@@ -32,7 +32,7 @@ with h5py.File(folder / "scan.nxs", "w") as file:
     entry = file.create_group("entry")
     entry.attrs["NX_class"] = "NXentry"
     # From the top down, compressed.
-    data(entry, "topography", "data", SAMPLES[::-1].astype("<f4"), {"y": (y[::-1], "angstrom"), "x": (x, "m")}, "nm", chunks=(2, 5), compression="gzip")
+    data(entry, "topography", "data", SAMPLES[::-1].astype("<f4"), {"y": (y[::-1], "angstrom"), "x": (x, "m")}, "m", chunks=(2, 5), compression="gzip")
     # The first dimension is x.
     data(entry, "map", "current", SAMPLES.T[::-1].astype(">i2"), {"x": (x[::-1], "m"), "y": (y, "angstrom")}, "A")
     stack = SAMPLES[:, :, np.newaxis] + 10000.0 * np.arange(2)

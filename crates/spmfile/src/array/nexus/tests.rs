@@ -24,7 +24,7 @@ fn scan() -> Scan {
 fn positions_tell_where_samples_are() {
     let scan = scan();
     let expected = [
-        ("topography", "nm", 0),
+        ("topography", "m", 0),
         ("current", "A", 0),
         ("didv (bias -0.5 V)", "S", 0),
         ("didv (bias 0.1 V)", "S", 1),
