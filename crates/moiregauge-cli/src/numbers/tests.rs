@@ -135,7 +135,7 @@ fn base(command: &str, option: &str, folder: &Path) -> Option<Vec<OsString>> {
         }
         "validate" => {
             base.push("-q".into());
-            for (name, value) in [("sets", "2"), ("pixels", "48"), ("scans", "2")] {
+            for (name, value) in [("sets", "2"), ("pixels", "32"), ("scans", "2")] {
                 if name != option {
                     base.extend([format!("--{name}").into(), value.into()]);
                 }
@@ -195,7 +195,7 @@ fn ended(words: &[OsString], cli: Cli) -> Result<bool, String> {
 fn every_numeric_option_has_a_range() {
     let folder = tempfile::tempdir().unwrap();
     let set = ["moiregauge", "simulate", "--out"].map(OsString::from);
-    let small = ["--pixels", "64", "--scans", "2"].map(OsString::from);
+    let small = ["--pixels", "32", "--scans", "2"].map(OsString::from);
     let set: Vec<OsString> = set
         .into_iter()
         .chain([folder.path().into()])
