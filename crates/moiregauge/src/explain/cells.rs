@@ -8,6 +8,7 @@ use std::f64::consts::TAU;
 
 use heterostrain::lattice::shortest_pair;
 use nalgebra::{Matrix2, Vector2};
+use rayon::prelude::*;
 
 use crate::explain::evidence::{Blocks, gain, weakest};
 use crate::explain::normal::{Phases, gains};
@@ -82,20 +83,23 @@ pub(crate) fn better_cell(image: &Image, pair: &Matrix2<f64>) -> Nested {
     let rows = (0..3).map(Supercell::Rows).filter(|_| elongated);
     let all = all.into_iter().chain(rows);
     let mut larger: Option<(Matrix2<f64>, f64)> = None;
-    let mut is_shown =
-        |coarse: &Matrix2<f64>, supercell| match superlattice(image, coarse, supercell) {
-            Some(Superlattice::NotShown(by)) => {
-                if by > larger.map_or(0.0, |(_, most)| most) {
-                    larger = Some((*coarse, by));
-                }
-                false
+    let mut is_shown = |coarse: &Matrix2<f64>, said: Option<Superlattice>| match said {
+        Some(Superlattice::NotShown(by)) => {
+            if by > larger.map_or(0.0, |(_, most)| most) {
+                larger = Some((*coarse, by));
             }
-            said => said == Some(Superlattice::Shown),
-        };
-    let mut coarse = all
-        .clone()
-        .filter_map(|supercell| Some((supercell, supercell.coarse(pair)?)));
-    let shown = coarse.find(|(supercell, coarse)| is_shown(coarse, *supercell));
+            false
+        }
+        said => said == Some(Superlattice::Shown),
+    };
+    let coarse = all.clone();
+    let coarse = coarse.filter_map(|supercell| Some((supercell, supercell.coarse(pair)?)));
+    let coarse: Vec<(Supercell, Matrix2<f64>)> = coarse.collect();
+    let said = coarse.par_iter();
+    let said = said.map(|(supercell, coarse)| superlattice(image, coarse, *supercell));
+    let mut said = coarse.iter().zip(said.collect::<Vec<_>>());
+    let shown = said.find(|((_, coarse), said)| is_shown(coarse, *said));
+    let shown = shown.map(|(shown, _)| *shown);
     let own = OnceCell::new();
     let better = shown.or_else(|| {
         let mut fine = all.map(|supercell| (supercell, supercell.fine(pair)));
@@ -103,7 +107,7 @@ pub(crate) fn better_cell(image: &Image, pair: &Matrix2<f64>) -> Nested {
             // Moirés of hexagonal layers are nearly hexagons: half-order waves in one direction make a superlattice of one.
             let is_regular = elongated && !is_elongated(fine);
             predicts_as_well(image, fine, *own.get_or_init(|| gain(image, pair))) == Some(true)
-                && (is_regular || !is_shown(pair, *supercell))
+                && (is_regular || !is_shown(pair, superlattice(image, pair, *supercell)))
         })
     });
     let better = better.map(|(_, pair)| pair);

@@ -40,9 +40,12 @@ impl Blocks {
 /// improves the prediction of pixels that were held out, in an image without its background; `bends`: its phases may be cubic polynomials. Means of
 /// lines are taken off where that shows more. `None` where the image is too small.
 pub(crate) fn weakest(image: &Image, pair: &Matrix2<f64>, bends: bool) -> Option<f64> {
-    let plain = of_image(image, pair, bends)?;
-    let level = remove_background(image, Background::LineMean);
-    Some(of_image(&level, pair, bends).map_or(plain, |level| level.max(plain)))
+    let level = || remove_background(image, Background::LineMean);
+    let (plain, level) = rayon::join(
+        || of_image(image, pair, bends),
+        || of_image(&level(), pair, bends),
+    );
+    plain.map(|plain| level.map_or(plain, |level| level.max(plain)))
 }
 
 fn of_image(image: &Image, pair: &Matrix2<f64>, bends: bool) -> Option<f64> {

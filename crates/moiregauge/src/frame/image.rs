@@ -1,5 +1,7 @@
 //! A plain matrix of pixel values.
 
+use rayon::prelude::*;
+
 /// Pixel values row by row; row 0 is the bottom line, column 0 the left one. NaN marks missing pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
@@ -54,28 +56,28 @@ impl Image {
     #[must_use]
     pub fn binned(&self, factor: usize) -> Self {
         let (rows, columns) = (self.rows / factor, self.columns / factor);
-        let mut values = Vec::with_capacity(rows * columns);
-        let (mut sums, mut counts) = (vec![0.0; columns], vec![0usize; columns]);
-        for row in 0..rows {
-            sums.fill(0.0);
-            counts.fill(0);
+        let mut values = vec![0.0; rows * columns];
+        let lines = values.par_chunks_exact_mut(columns.max(1)).enumerate();
+        lines.for_each(|(row, sums)| {
+            let mut counts = vec![0usize; columns];
             for line in row * factor..(row + 1) * factor {
                 let blocks = self.row(line).chunks_exact(factor);
-                for ((block, sum), count) in blocks.zip(&mut sums).zip(&mut counts) {
+                for ((block, sum), count) in blocks.zip(&mut *sums).zip(&mut counts) {
                     for v in block.iter().filter(|v| v.is_finite()) {
                         *sum += v;
                         *count += 1;
                     }
                 }
             }
-            values.extend(sums.iter().zip(&counts).map(|(sum, &count)| {
-                if 2 * count >= factor * factor {
-                    sum / count as f64
+            for (sum, &count) in sums.iter_mut().zip(&counts) {
+                let is_there = 2 * count >= factor * factor;
+                *sum = if is_there {
+                    *sum / count as f64
                 } else {
                     f64::NAN
-                }
-            }));
-        }
+                };
+            }
+        });
         Self::new(rows, columns, values)
     }
 }
