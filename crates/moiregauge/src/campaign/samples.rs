@@ -9,6 +9,7 @@ use heterostrain::lattice::{Waves, same_handed};
 use nalgebra::Vector2;
 
 use crate::campaign::group::{Group, folder};
+use crate::campaign::set::moire::moire;
 use crate::campaign::shells::of_each_other;
 use crate::caveat::Caveat;
 use crate::caveat::sets::{DifferentSamples, SetDoubt};
@@ -18,8 +19,8 @@ use crate::settings::knobs::Settings;
 /// Lattices whose waves differ by more than this share along the fast axis are of different samples, or places:
 /// scanners repeat themselves better. See docs/constants.md.
 const APART: f64 = 0.01;
-/// The same for methods that read peaks off pixels, which are off by a per cent, and for frames of one place without position
-/// sensors: creep and hysteresis make 1 to 2 % between frames up and down, or between trace and retrace.
+/// The same for methods that read peaks off pixels, which are off by a per cent, and for atoms at one place without position sensors: creep
+/// and hysteresis make 1 to 2 % between frames up and down, or between trace and retrace.
 const APART_ROUGHLY: f64 = 0.03;
 /// Differences below this many σ are noise, however large: none of all pairs of scans exceeds it by chance.
 const SIGMAS: f64 = 5.0;
@@ -94,12 +95,15 @@ struct Parts {
     apart: f64,
 }
 
-/// Whether headers say that two scans show one place, and no position sensor says how the scanner moved: frames of one folder with dates
-/// that hold the middle of each other.
-fn are_of_one_place(a: &MeasuredScan, b: &MeasuredScan) -> bool {
+/// Whether a difference of two scans is that of the scanner. No moiré of the layers is as short, so that they show atoms, whose length is known (that of a
+/// moiré differs from place to place); headers say that they show one place (one folder, dates, frames that hold the middle of each other); no position
+/// sensor says how the scanner moved.
+fn are_atoms_of_one_place(a: &MeasuredScan, b: &MeasuredScan, settings: &Settings) -> bool {
     let told = |scan: &MeasuredScan| {
-        let frame = &scan.lines.first()?.geometry;
-        let known = scan.acquired.is_some() && !frame.from_sensors;
+        let line = scan.lines.first()?;
+        let frame = &line.geometry;
+        let atoms = moire(&line.in_sensor_coordinates(), settings).is_none();
+        let known = atoms && scan.acquired.is_some() && !frame.from_sensors;
         known.then(|| (frame.centre(), frame.extent()))
     };
     let (Some((one, extent)), Some((other, size))) = (told(a), told(b)) else {
@@ -120,7 +124,8 @@ fn parts(scans: &[MeasuredScan], settings: &Settings) -> Parts {
     let file = |view: usize| scans[views[view].0].file.as_str();
     let apart = |a: usize, b: usize| {
         let ((i, one), (k, other)) = (&views[a], &views[b]);
-        let roughly = !settings.method.is_joint() || are_of_one_place(&scans[*i], &scans[*k]);
+        let roughly =
+            !settings.method.is_joint() || are_atoms_of_one_place(&scans[*i], &scans[*k], settings);
         one.apart(other, if roughly { APART_ROUGHLY } else { APART })
     };
     for new in 0..views.len() {

@@ -155,7 +155,7 @@ pub(crate) fn gaussian_mean(
         });
         lines
     };
-    // One line stands for all where they are alike.
+    // Where no pixel is missing, `lines` is one line that all others are like.
     let up = |lines: &[f64], row: usize| {
         let mut sums = vec![0.0; columns];
         widest(

@@ -322,6 +322,18 @@ fn what_is_no_creep_is_another_sample() {
     assert_eq!(sets(measured("s", &[up, turned].concat())), 2, "a grain");
 }
 
+/// The length of atoms is known, that of a moiré is not: moirés that differ by as much are of other samples, wherever headers place them.
+#[test]
+fn moires_that_differ_are_other_samples() {
+    let mut set = small_set(5);
+    set.raster.sensors = false;
+    let one = frames(&set);
+    set.sample.twist_deg *= 1.02;
+    let found = analyse(measured("s", &[one, frames(&set)].concat()), &quick());
+    assert_eq!(count(&found, "samples-separated"), 1, "{:?}", found.caveats);
+    assert_eq!(found.sets.len(), 2);
+}
+
 /// Two samples make two sets, whatever their vectors are called, and no number is the mean of both.
 #[test]
 fn two_samples_are_two_sets() {
