@@ -25,6 +25,8 @@ type Rows = fn(&Work) -> Vec<Row>;
 
 /// Runs of which the least counts.
 const RUNS: usize = 5;
+/// Shortest time over which work beside a row is measured.
+const SHORTEST: Duration = Duration::from_millis(300);
 
 /// A row of the table.
 struct Row {
@@ -434,7 +436,8 @@ fn faster(one: Cost, two: Cost) -> String {
     format!("{:.2}: {:.1}", two.wall, one.wall / two.wall)
 }
 
-/// Seconds of the fastest of some runs: of the processor where the system tells (Linux), since others may use it as well.
+/// Seconds of the fastest of some runs: of the processor where the system tells (Linux), since others may use it as well. Short work is repeated, since
+/// the system counts in steps of some milliseconds.
 fn least(mut work: impl FnMut()) -> f64 {
     let processor = || {
         let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
@@ -442,11 +445,14 @@ fn least(mut work: impl FnMut()) -> f64 {
         Some(nanoseconds * 1e-9)
     };
     let once = |_| {
-        let (clock, start) = (Instant::now(), processor());
-        work();
+        let (clock, start, mut times) = (Instant::now(), processor(), 0.0);
+        while clock.elapsed() < SHORTEST {
+            work();
+            times += 1.0;
+        }
         let elapsed = clock.elapsed().as_secs_f64();
         let end = start.and_then(|start| Some(processor()? - start));
-        end.unwrap_or(elapsed)
+        end.unwrap_or(elapsed) / times
     };
     (0..RUNS).map(once).fold(f64::INFINITY, f64::min)
 }
