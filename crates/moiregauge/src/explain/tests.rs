@@ -6,6 +6,7 @@ use nalgebra::{Matrix2, Vector2};
 
 use crate::explain::cells::{BETTER, Supercell, Superlattice, better_cell, superlattice};
 use crate::explain::evidence::{gain, weakest};
+use crate::explain::scene::gaussian_mean;
 use crate::explain::table::table;
 use crate::frame::image::Image;
 use crate::numbers::rng::normals;
@@ -43,6 +44,45 @@ fn the_gain_is_the_fraction_of_the_variance() {
         assert!(weakest(&stripes, false) < 3.0);
         let noise = image(seed, 1.0, |_| 0.0);
         assert!(weakest(&noise, false) < 3.0 && gain(&noise, &pair()).unwrap() < 0.01);
+    }
+}
+
+/// Means under a Gaussian are what their definition says, with missing pixels and without, in the lines that are wanted.
+#[test]
+fn gaussian_means_match_their_definition() {
+    let (columns, rows, sigma) = (11, 7, 1.3_f64);
+    let mut normal = normals(3, "means", 0);
+    let whole: Vec<f64> = (0..rows * columns).map(|_| normal()).collect();
+    let mut holes = whole.clone();
+    for missing in [0, 5, 24, 76] {
+        holes[missing] = f64::NAN;
+    }
+    let wanted: Vec<bool> = (0..rows).map(|row| row != 2).collect();
+    let tap = |a: usize, b: usize| {
+        let off = a.abs_diff(b) as f64;
+        let near = off <= (3.0 * sigma).ceil();
+        if near {
+            (-0.5 * (off / sigma).powi(2)).exp()
+        } else {
+            0.0
+        }
+    };
+    for values in [whole, holes] {
+        let found = gaussian_mean(&values, columns, sigma, &wanted);
+        for (i, found) in found.iter().enumerate() {
+            let [x, y] = [i % columns, i / columns];
+            let (mut sum, mut weights) = (0.0, 0.0);
+            for (k, value) in values.iter().enumerate().filter(|(_, v)| v.is_finite()) {
+                let weight = tap(x, k % columns) * tap(y, k / columns);
+                sum += weight * value;
+                weights += weight;
+            }
+            let expected = if wanted[y] { sum / weights } else { 0.0 };
+            assert!(
+                (found - expected).abs() < 1e-12,
+                "{x} {y}: {found} {expected}"
+            );
+        }
     }
 }
 
