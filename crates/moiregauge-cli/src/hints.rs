@@ -1,7 +1,7 @@
 //! Options of this program that help against what is doubtful.
 
 /// By the code of a caveat.
-const HINTS: [(&str, &str); 44] = [
+const HINTS: [(&str, &str); 46] = [
     ("several-images", "--channel NAME or --image N"),
     ("channel-chosen", "--channel NAME"),
     ("nothing-excluded", "--exclude NAME with the name of a file"),
@@ -64,6 +64,8 @@ const HINTS: [(&str, &str); 44] = [
         "twist-sense-open",
         "--twist-sense or --lattice-angle-2 DEG±SIGMA",
     ),
+    ("ruler-readings-open", "--twist-sense"),
+    ("ruler-layer-open", "--ruler 1 or --ruler 2"),
     ("no-twist-strain", "--layers UPPER/LOWER"),
     ("map-not-drift-corrected", "--drift X Y"),
     ("map-of-grains", "--grain N"),

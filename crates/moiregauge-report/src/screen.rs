@@ -345,11 +345,8 @@ fn readings(text: &mut String, readings: &Readings) {
                 }
             }
         }
-        for other in tensor
-            .alternatives
-            .iter()
-            .filter(|_| readings.layers_differ)
-        {
+        let others = tensor.alternatives.iter().map(|other| &other.found);
+        for other in others.filter(|_| readings.layers_differ) {
             let _ = writeln!(
                 text,
                 "    the same orientation by symmetry: twist {}°, mean strain {} % (statistical errors)",

@@ -130,7 +130,7 @@ fn meaning(text: &mut String, document: &MoireDocument, readings: &Readings, axe
             text.push_str("  equally good, with the other sense of the twist:\n");
             strain_tensor(text, &opposite.found, tensor.poisson_ratio);
         }
-        for other in &tensor.alternatives {
+        for other in tensor.alternatives.iter().map(|other| &other.found) {
             let _ = writeln!(
                 text,
                 "  or twist {}°, mean strain {} %",

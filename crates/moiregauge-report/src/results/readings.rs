@@ -282,7 +282,9 @@ impl From<&TensorReading> for StrainTensorResult {
                     twist_interval_deg: interval.map(|end| number(end * degree())),
                 }
             }),
-            alternatives: reading.alternatives.iter().map(Into::into).collect(),
+            alternatives: (reading.alternatives.iter())
+                .map(|other| tensor_numbers(&other.found, &other.in_all()))
+                .collect(),
         }
     }
 }

@@ -4,7 +4,9 @@
 
 use heterostrain::Estimate;
 use heterostrain::lattice::{Lattice, Px};
-use heterostrain::strain::{KnownOrientation, LatticeDirection, Ruler, StrainDraw, TwistStrain};
+use heterostrain::strain::{
+    KnownOrientation, LatticeDirection, Ruler, StrainDraw, StrainTensor, TwistStrain,
+};
 use nalgebra::{Matrix2, Vector2};
 use spmfile::{DateTime, FrameDirection, LineDirection};
 
@@ -19,6 +21,7 @@ use crate::frame::axis::Axis;
 use crate::lattice::Evidence;
 use crate::meaning::budget::Budget;
 use crate::meaning::readings::Readings;
+use crate::meaning::tensor::SenseReading;
 use crate::scan::picture::{Illustration, Picture};
 use crate::settings::knobs::Settings;
 
@@ -160,13 +163,14 @@ pub struct LineRuler {
 const POSSIBLE: f64 = 0.005;
 
 impl Ruled {
-    /// Twist (rad) and mean strain of the other readings that are possible.
-    pub(crate) fn others(&self) -> impl Iterator<Item = [f64; 2]> {
+    /// The other readings that are possible, with everything in the budget for their covariance: the ruler does not tell them from that
+    /// of `mean`, which has the least strain.
+    pub fn others(&self) -> impl Iterator<Item = StrainTensor> {
         let tensor = self.mean.readings.tensor.iter();
         let others = tensor.flat_map(|tensor| &tensor.alternatives);
         others
+            .map(SenseReading::in_all)
             .filter(|t| t.mean.abs() < POSSIBLE)
-            .map(|t| [t.twist, t.mean])
     }
 }
 

@@ -1,6 +1,7 @@
 //! Doubts about the orientation of a layer and the sense of the twist.
 
 use heterostrain::Estimate;
+use heterostrain::strain::StrainTensor;
 
 use crate::caveat::explained::explain;
 use crate::caveat::readings::degrees;
@@ -62,6 +63,16 @@ pub enum OrientationDoubt {
          layer. Check both"
     )]
     SenseContradicts,
+    /// Readings of the moiré by the atoms beside it that the symmetry does not tell apart.
+    #[error(
+        "the atoms beside the moiré leave more than one twist open: {}. They are not used until the sense of the twist, or the \
+         reading, is known",
+        any_of(.readings)
+    )]
+    RulerReadings {
+        /// All of them.
+        readings: Vec<SenseNumbers>,
+    },
     /// Two equal layers: both senses explain the moiré.
     #[error(
         "the twist may have either sense: {} and {}{}. The two layers are equal, and the orientation of one of them \
@@ -130,6 +141,20 @@ pub struct SenseNumbers {
     pub strain: f64,
 }
 
+impl From<StrainTensor> for SenseNumbers {
+    fn from(found: StrainTensor) -> Self {
+        Self {
+            twist: found.twist(),
+            strain: found.mean,
+        }
+    }
+}
+
+fn any_of(all: &[SenseNumbers]) -> String {
+    let all: Vec<String> = all.iter().map(SenseNumbers::to_string).collect();
+    all.join(", or ")
+}
+
 fn other_readings(all: &[[f64; 2]]) -> String {
     let words =
         |[twist, strain]: &[f64; 2]| format!("{} with {:+.2} %", degrees(*twist), 100.0 * strain);
@@ -164,6 +189,11 @@ explain! { OrientationDoubt:
         "The atoms beside the moiré may be those of either layer. The likelier one was taken: the upper layer, unless their size says \
          the other one."
         "Say which layer's atoms the image shows."
+    RulerReadings "ruler-readings-open" Warning
+        "The layers differ, and the atoms of one of them fix the other only up to a symmetry: each reading that is listed has little \
+         strain, and one of them is right. The twist that is reported is by the scanner, without the atoms."
+        "Give the sense of the twist, as the stacking was planned. Where the readings have the same sense, the one with the \
+         planned twist is right."
     SenseOpen "twist-sense-open" Warning
         "The two layers are equal, and the orientation of one of them does not determine the sense of the twist. Both \
          solutions fit equally well and have different strain tensors."

@@ -148,11 +148,11 @@ fn about_tensor(
         .into());
     }
     if !tensor.alternatives.is_empty() && settings.substrate.is_some() {
-        let others = tensor.alternatives.iter().map(|t| [t.twist, t.mean]);
+        let others = tensor.alternatives.iter().map(|t| &t.found);
         add(OrientationDoubt::Ambiguous {
             twist: tensor.best.twist,
             strain: tensor.best.mean,
-            others: others.collect(),
+            others: others.map(|t| [t.twist, t.mean]).collect(),
         }
         .into());
     }
@@ -169,12 +169,8 @@ fn about_sense(tensor: &TensorReading, add: &mut impl FnMut(Doubt)) {
     let Some(opposite) = &tensor.opposite else {
         return;
     };
-    let numbers = |tensor: StrainTensor| SenseNumbers {
-        twist: Estimate::new(tensor.twist, tensor.twist().sigma),
-        strain: tensor.mean,
-    };
     add(OrientationDoubt::SenseOpen {
-        senses: [numbers(tensor.in_all()), numbers(opposite.in_all())],
+        senses: [tensor.in_all(), opposite.in_all()].map(SenseNumbers::from),
         magnitudes: tensor.magnitudes(),
     }
     .into());

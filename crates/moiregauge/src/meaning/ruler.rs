@@ -49,15 +49,16 @@ impl ByRuler {
         };
         let nu = bilayer.stretched.poisson_ratio;
         let known = |t: &StrainTensor| t.covariance + context.strained(t) + context.of_constants(t);
+        let other = |found: StrainTensor| SenseReading {
+            known: known(&found),
+            found,
+        };
         let twist_strain = best.uniaxial(nu);
         let tensor = TensorReading {
             known: known(&best),
-            opposite: opposite.map(|found| SenseReading {
-                known: known(&found),
-                found,
-            }),
+            opposite: opposite.map(other),
             best,
-            alternatives: all.split_off(1),
+            alternatives: all.split_off(1).into_iter().map(other).collect(),
             poisson_ratio: nu,
             other_vector: None,
             disagreement: None,

@@ -29,7 +29,7 @@ pub struct TensorReading {
     /// where the sense is known.
     pub opposite: Option<SenseReading>,
     /// Other solutions of the same orientation with a mean strain below 1 %.
-    pub alternatives: Vec<StrainTensor>,
+    pub alternatives: Vec<SenseReading>,
     /// ν of the strained layer.
     pub poisson_ratio: f64,
     /// The mean strain, if the orientation were that of the other kind of vector, 30° off; `None` for
@@ -41,7 +41,7 @@ pub struct TensorReading {
     pub sense_contradicted: bool,
 }
 
-/// The solution for one sense of the twist.
+/// Another solution: that for the other sense of the twist, or for another direction that is equal by symmetry.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct SenseReading {
@@ -87,17 +87,18 @@ impl TensorReading {
         let mut left = left.into_iter();
         let best = left.next()?;
         let known = |of: &StrainTensor| known(of, lattice, &orientation, budget, settings);
+        let other = |found: StrainTensor| {
+            let known = known(&found)?;
+            Some(SenseReading { found, known })
+        };
         Some(Self {
             best,
             known: known(&best)?,
             opposite: match opposite {
-                Some(found) => Some(SenseReading {
-                    known: known(&found)?,
-                    found,
-                }),
+                Some(found) => Some(other(found)?),
                 None => None,
             },
-            alternatives: left.collect(),
+            alternatives: left.filter_map(other).collect(),
             other_vector: other_vector(lattice, bilayer, &orientation),
             poisson_ratio: bilayer.stretched.poisson_ratio,
             disagreement,

@@ -2,6 +2,8 @@
 
 use std::f64::consts::{FRAC_PI_3, TAU};
 
+use heterostrain::material::Material;
+use heterostrain::strain::{StrainTensor, TwistSense};
 use moiregauge::campaign::{Analysis, analyse};
 use moiregauge::map::TwistStrainMap;
 use moiregauge::meaning::Source;
@@ -12,71 +14,103 @@ use moiregauge::window::Resolution;
 use nalgebra::{Matrix2, Rotation2, Vector2};
 use spmfile::{FrameDirection, Scan, Span};
 
-const PIXELS: usize = 256;
-/// nm.
-const SIZE: f64 = 18.0;
-/// Graphene.
+/// Graphene, nm.
 const CONSTANT: f64 = 0.246;
 const TWIST: f64 = 0.055;
 /// Of layer 2 against layer 1: a mean of 0.15 % and a shear part of 0.11 %.
 const STRAIN: Matrix2<f64> = Matrix2::new(1.002, 0.0005, 0.0005, 1.001);
 
-/// Three waves of a layer (rad/nm) that was deformed: they meet, the third is the second less the first.
-fn waves(deformation: &Matrix2<f64>) -> [Vector2<f64>; 3] {
-    let length = 2.0 * TAU / (3f64.sqrt() * CONSTANT);
+/// Three waves, rad/nm.
+type Waves = [Vector2<f64>; 3];
+
+/// Of a layer that was deformed: they meet, the third is the second less the first.
+fn waves(constant: f64, deformation: &Matrix2<f64>) -> Waves {
+    let length = 2.0 * TAU / (3f64.sqrt() * constant);
     let back = deformation.try_inverse().unwrap().transpose();
     let of = |angle: f64| back * Vector2::new(angle.cos(), angle.sin()) * length;
     let [a, b] = [of(0.0), of(FRAC_PI_3)];
     [a, b, b - a]
 }
 
-/// A frame of a scanner that shows `frame` times what is there: moiré of amplitude 1, atoms of layer 2 of amplitude `atoms`, changed by the
+/// A frame of a scanner that shows `frame` times what is there: moirés of amplitude 1, atoms of amplitude `atoms`, changed by the first
 /// moiré, and some noise.
+struct Shown<'a> {
+    frame: &'a Matrix2<f64>,
+    /// By how much of the size of the frame the scanner bends along both axes.
+    bow: f64,
+    atoms: f64,
+    seed: u64,
+    pixels: usize,
+    /// nm.
+    size: f64,
+}
+
+/// Atoms of layer 2, which is turned by `TWIST` and strained against layer 1.
 fn frame(frame: &Matrix2<f64>, atoms: f64, seed: u64) -> Scan {
     bent_frame(frame, 0.0, atoms, seed)
 }
 
-/// The same of a scanner that bends by `bow` of the size of the frame along both axes.
+/// The same of a scanner that bends.
 fn bent_frame(frame: &Matrix2<f64>, bow: f64, atoms: f64, seed: u64) -> Scan {
     let first = Rotation2::new(0.4).into_inner();
     let second = Rotation2::new(TWIST).into_inner() * STRAIN * first;
-    let [one, two] = [waves(&first), waves(&second)];
-    let inverse = frame.try_inverse().unwrap();
-    let pitch = SIZE / PIXELS as f64;
-    let mut state = seed;
-    let mut values = Vec::new();
-    // The top row comes first.
-    for row in (0..PIXELS).rev() {
-        for column in 0..PIXELS {
-            let at = Vector2::new(column as f64, row as f64) * pitch;
-            let share = at / SIZE;
-            let bent = Vector2::new(share.y.powi(2), share.x * share.y) * bow * SIZE;
-            let at = inverse * (at + bent);
-            let sum = |of: &dyn Fn(usize) -> Vector2<f64>| {
-                (0..3).map(|i| of(i).dot(&at).cos()).sum::<f64>()
-            };
-            let moire = sum(&|i| two[i] - one[i]);
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            let noise = (state >> 40) as f64 / (1u64 << 24) as f64 - 0.5;
-            values.push(moire + atoms * (1.0 + 0.2 * moire) * sum(&|i| two[i]) + noise);
+    let layers = [first, second].map(|layer| waves(CONSTANT, &layer));
+    let shown = Shown {
+        frame,
+        bow,
+        atoms,
+        seed,
+        pixels: 256,
+        size: 18.0,
+    };
+    shown.scan(&layers[1], &layers[..1])
+}
+
+impl Shown<'_> {
+    /// The atoms of a layer and its moirés with others.
+    fn scan(&self, seen: &Waves, others: &[Waves]) -> Scan {
+        let (pixels, size) = (self.pixels, self.size);
+        let inverse = self.frame.try_inverse().unwrap();
+        let pitch = size / pixels as f64;
+        let mut state = self.seed;
+        let mut values = Vec::new();
+        // The top row comes first.
+        for row in (0..pixels).rev() {
+            for column in 0..pixels {
+                let at = Vector2::new(column as f64, row as f64) * pitch;
+                let share = at / size;
+                let bent = Vector2::new(share.y.powi(2), share.x * share.y) * self.bow * size;
+                let at = inverse * (at + bent);
+                let sum = |of: &dyn Fn(usize) -> Vector2<f64>| {
+                    (0..3).map(|i| of(i).dot(&at).cos()).sum::<f64>()
+                };
+                let moires = others
+                    .iter()
+                    .map(|other| sum(&|i| seen[i] - other[i]))
+                    .collect::<Vec<_>>();
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1_442_695_040_888_963_407);
+                let noise = (state >> 40) as f64 / (1u64 << 24) as f64 - 0.5;
+                let atoms = self.atoms * (1.0 + 0.2 * moires[0]) * sum(&|i| seen[i]);
+                values.push(moires.iter().sum::<f64>() + atoms + noise);
+            }
         }
+        let mut bytes = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
+        let head =
+            format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({pixels}, {pixels}), }}");
+        bytes.extend(format!("{head:<117}\n").bytes());
+        bytes.extend(values.iter().flat_map(|v| v.to_le_bytes()));
+        let mut scan = spmfile::read(&bytes).unwrap();
+        scan.size_nm = Some([size; 2]);
+        scan.line_rate_hz = Some(10.0);
+        scan.frame_direction = Some(FrameDirection::Up);
+        for channel in &mut scan.channels {
+            (channel.width_nm, channel.height_nm) = (Some(size), Some(size));
+            channel.span = Span::PixelEdges;
+        }
+        scan
     }
-    let mut bytes = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
-    let head =
-        format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({PIXELS}, {PIXELS}), }}");
-    bytes.extend(format!("{head:<117}\n").bytes());
-    bytes.extend(values.iter().flat_map(|v| v.to_le_bytes()));
-    let mut scan = spmfile::read(&bytes).unwrap();
-    scan.size_nm = Some([SIZE; 2]);
-    scan.line_rate_hz = Some(10.0);
-    scan.frame_direction = Some(FrameDirection::Up);
-    for channel in &mut scan.channels {
-        (channel.width_nm, channel.height_nm) = (Some(SIZE), Some(SIZE));
-        channel.span = Span::PixelEdges;
-    }
-    scan
 }
 
 fn analysed(scans: &[Scan], ruler: RulerLayer) -> Analysis {
@@ -246,4 +280,67 @@ fn the_atoms_calibrate_the_scanner() {
         );
         assert!(found.sigma > 0.05);
     }
+}
+
+/// Graphene on hBN near 1.7°: the symmetry of the seen layer leaves two readings, which differ in more than their sense. Both are told, and one
+/// of them is true; the sense of the twist decides.
+#[test]
+fn different_layers_have_readings_of_which_the_sense_decides() {
+    let (twist, strain) = (0.03, Matrix2::new(0.9999, 0.0002, 0.0002, 0.9992));
+    let hbn = Material::named("hBN").unwrap();
+    let first = Rotation2::new(0.4).into_inner();
+    let second = Rotation2::new(twist).into_inner() * strain * first;
+    let [lower, upper] = [
+        waves(hbn.lattice_constant_nm, &first),
+        waves(CONSTANT, &second),
+    ];
+    let shown = Shown {
+        frame: &scanner(1.01),
+        bow: 0.0,
+        atoms: 0.5,
+        seed: 3,
+        pixels: 320,
+        size: 28.0,
+    };
+    let scan = shown.scan(&upper, &[lower]);
+    let found = |twist_sense: Option<TwistSense>| {
+        let settings = Settings {
+            drift_draws: 0,
+            strain_draws: 0,
+            substrate: Some(hbn.clone()),
+            ruler: RulerLayer::Second,
+            twist_sense,
+            ..Settings::default()
+        };
+        analyse(
+            vec![measure_scan("scan", &scan, &settings, None).unwrap()],
+            &settings,
+        )
+    };
+    let pulls = |tensor: &StrainTensor| {
+        let mean = (tensor.mean - (strain.trace() / 2.0 - 1.0)) / tensor.mean().sigma;
+        [(tensor.twist - twist) / tensor.twist().sigma, mean]
+    };
+    let open = found(None);
+    let ruler = open.sets[0].ruler.as_ref().unwrap();
+    assert!(!ruler.used);
+    let told = |found: &Analysis| {
+        let mut codes = found.caveats.iter().map(moiregauge::caveat::Caveat::code);
+        codes.any(|code| code == "ruler-readings-open")
+    };
+    assert!(told(&open));
+    let tensor = ruler.mean.readings.tensor.as_ref().unwrap();
+    let readings: Vec<StrainTensor> = std::iter::once(tensor.in_all())
+        .chain(ruler.others())
+        .collect();
+    assert!(readings.len() > 1);
+    let true_ones = readings
+        .iter()
+        .filter(|t| pulls(t).iter().all(|pull| pull.abs() < 4.0));
+    assert_eq!(true_ones.count(), 1, "{readings:?}");
+    let decided = found(Some(TwistSense::Positive));
+    let set = &decided.sets[0];
+    assert!(set.ruler.as_ref().unwrap().used && !told(&decided));
+    let tensor = set.mean.as_ref().unwrap().readings.tensor.as_ref().unwrap();
+    assert!(pulls(&tensor.in_all()).iter().all(|pull| pull.abs() < 4.0));
 }

@@ -5,7 +5,7 @@ use crate::campaign::set::mean::counted;
 use crate::campaign::set::moire;
 use crate::caveat::Caveat;
 use crate::caveat::moires::MoireDoubt;
-use crate::caveat::orientation::OrientationDoubt;
+use crate::caveat::orientation::{OrientationDoubt, SenseNumbers};
 use crate::caveat::sets::{Scattered, SetDoubt};
 use crate::meaning::about::caveats;
 use crate::settings::knobs::Settings;
@@ -35,10 +35,9 @@ pub(crate) fn about_set(
     if let Some(ruler) = ruler.filter(|ruler| ruler.others().next().is_some())
         && let Some(tensor) = &ruler.mean.readings.tensor
     {
-        let doubt = OrientationDoubt::Ambiguous {
-            twist: tensor.best.twist,
-            strain: tensor.best.mean,
-            others: ruler.others().collect(),
+        let readings = std::iter::once(tensor.in_all()).chain(ruler.others());
+        let doubt = OrientationDoubt::RulerReadings {
+            readings: readings.map(SenseNumbers::from).collect(),
         };
         caveats.push(Caveat::new(doubt, &set.name));
     }

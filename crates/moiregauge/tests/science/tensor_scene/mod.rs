@@ -134,7 +134,8 @@ impl Outcome {
             return found.best;
         }
         let twist = truth(&self.simulation)[0];
-        let all = std::iter::once(&found.best).chain(&found.alternatives);
+        let others = found.alternatives.iter().map(|other| &other.found);
+        let all = std::iter::once(&found.best).chain(others);
         let off = |t: &&StrainTensor| (t.twist - twist).abs();
         *all.min_by(|a, b| off(a).total_cmp(&off(b)))
             .expect("a tensor")
