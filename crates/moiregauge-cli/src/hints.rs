@@ -1,7 +1,7 @@
 //! Options of this program that help against what is doubtful.
 
 /// By the code of a caveat.
-const HINTS: [(&str, &str); 46] = [
+const HINTS: [(&str, &str); 47] = [
     ("several-images", "--channel NAME or --image N"),
     ("channel-chosen", "--channel NAME"),
     ("nothing-excluded", "--exclude NAME with the name of a file"),
@@ -65,6 +65,10 @@ const HINTS: [(&str, &str); 46] = [
         "--twist-sense or --lattice-angle-2 DEG±SIGMA",
     ),
     ("ruler-readings-open", "--twist-sense"),
+    (
+        "ruler-moire-open",
+        "--ruler 2,off with one entry for each moiré",
+    ),
     ("ruler-layer-open", "--ruler 1 or --ruler 2"),
     ("no-twist-strain", "--layers UPPER/LOWER"),
     ("map-not-drift-corrected", "--drift X Y"),

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use moiregauge::settings::{RulerLayer, Settings};
+use moiregauge::settings::{MoireLayers, RulerLayer, Settings};
 
 use crate::numbers::number;
 
@@ -33,9 +33,10 @@ pub(crate) struct ScannerArgs {
     #[arg(long, value_name = "PERCENT", value_parser = number([0.0, 10.0]))]
     isotropic_strain: Option<f64>,
     /// Layer whose atoms the frames show beside the moiré and which measures them in place of the scanner: free of drift and
-    /// calibration. `auto`: whichever they show, where that is more accurate [default: auto]
-    #[arg(long, value_name = "LAYER", value_parser = ["1", "2", "auto", "off"])]
-    ruler: Option<String>,
+    /// calibration. `auto`: whichever they show, where that is more accurate. With --moires N one for all moirés, or one for each: `2,off` where
+    /// only the first has the layer that shows [default: auto]
+    #[arg(long, value_name = "LAYER", value_delimiter = ',', value_parser = ["1", "2", "auto", "off"])]
+    ruler: Vec<String>,
     /// Strain that this layer itself may have, along x and along y, per cent, for the budget [default: 0.1]
     #[arg(long, value_name = "PERCENT", value_parser = number([0.0, 10.0]))]
     ruler_strain: Option<f64>,
@@ -70,13 +71,36 @@ impl ScannerArgs {
         ] {
             *setting = given.unwrap_or(*setting);
         }
-        settings.ruler = match self.ruler.as_deref() {
-            Some("1") => RulerLayer::First,
-            Some("2") => RulerLayer::Second,
-            Some("off") => RulerLayer::Off,
-            Some(_) => RulerLayer::Auto,
-            None => settings.ruler,
+        let ruler = |named: &String| match named.as_str() {
+            "1" => RulerLayer::First,
+            "2" => RulerLayer::Second,
+            "off" => RulerLayer::Off,
+            _ => RulerLayer::Auto,
         };
+        match self.ruler.as_slice() {
+            [] => {}
+            [one] => {
+                settings.ruler = ruler(one);
+                for own in &mut settings.moire_layers {
+                    own.ruler = None;
+                }
+            }
+            each => {
+                let moires = settings.moires;
+                anyhow::ensure!(
+                    each.len() == moires,
+                    "--ruler: expected one layer for all moirés or one for each of the {moires}, found {}",
+                    each.len()
+                );
+                if settings.moire_layers.is_empty() {
+                    let (upper, lower) = (settings.material.clone(), settings.substrate.clone());
+                    settings.moire_layers = vec![MoireLayers::new(upper, lower); moires];
+                }
+                for (own, named) in settings.moire_layers.iter_mut().zip(each) {
+                    own.ruler = Some(ruler(named));
+                }
+            }
+        }
         if let Some(path) = &self.calibration {
             settings.scanner = Some(moiregauge_pipeline::calibrate::read_calibration(path)?);
         }

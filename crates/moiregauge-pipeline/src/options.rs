@@ -86,15 +86,20 @@ pub fn settings_on(
 
 /// The layers of a moiré: `"graphene/hBN"`, or a table of both.
 fn both(given: Value) -> Result<Value, OptionError> {
-    let Value::String(layers) = given else {
-        return Ok(given);
+    let layers = match given {
+        Value::String(layers) => layers,
+        Value::Object(mut table) => {
+            // Named, with what else is known of them.
+            let named = table.remove("layers");
+            if let Some(Value::Object(layers)) = named.map(both).transpose()? {
+                table.extend(layers);
+            }
+            return Ok(table.into());
+        }
+        given => return Ok(given),
     };
     let (material, substrate) = named_layers(&layers, &[]).map_err(wrong)?;
-    serde_json::to_value(MoireLayers {
-        material,
-        substrate,
-    })
-    .map_err(wrong)
+    serde_json::to_value(MoireLayers::new(material, substrate)).map_err(wrong)
 }
 
 /// A material by name; a table with the name of a known one changes that.

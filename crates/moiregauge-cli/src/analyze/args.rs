@@ -249,6 +249,7 @@ impl AnalyzeArgs {
         for (given, setting) in priors {
             *setting = given.unwrap_or(*setting);
         }
+        s.moires = self.moires.unwrap_or(s.moires);
         self.scanner.apply(&mut s)?;
         if self.channel.is_some() {
             s.channel.clone_from(&self.channel);
@@ -272,7 +273,6 @@ impl AnalyzeArgs {
         s.background = self.background.map_or(s.background, Into::into);
         s.grouping = self.grouping.map_or(s.grouping, Into::into);
         s.overlap |= self.overlap;
-        s.moires = self.moires.unwrap_or(s.moires);
         s.exclude.extend(self.exclude.iter().cloned());
         s.exclude_outliers |= self.exclude_outliers;
         s.frame_time_sigma_s = self.frame_time_sigma.unwrap_or(s.frame_time_sigma_s);
@@ -310,10 +310,7 @@ impl AnalyzeArgs {
         } else {
             let each = pairs.into_iter();
             s.moire_layers
-                .extend(each.map(|(material, substrate)| MoireLayers {
-                    material,
-                    substrate,
-                }));
+                .extend(each.map(|(upper, lower)| MoireLayers::new(upper, lower)));
         }
         Ok(())
     }

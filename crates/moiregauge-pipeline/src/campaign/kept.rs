@@ -185,9 +185,9 @@ fn measuring(settings: &Settings) -> Settings {
         material,
         substrate,
         strain_convention,
+        moire_layers,
         // What is chosen after measuring changes no measured scan.
         grain: _,
-        moire_layers: _,
         layers_chosen: _,
         lattice_angle: _,
         lattice_angle_2: _,
@@ -220,6 +220,7 @@ fn measuring(settings: &Settings) -> Settings {
         ruler: *ruler,
         material: material.clone(),
         substrate: substrate.clone(),
+        moire_layers: moire_layers.clone(),
         strain_convention: *strain_convention,
         ..Settings::default()
     }

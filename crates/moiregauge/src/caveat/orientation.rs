@@ -63,6 +63,12 @@ pub enum OrientationDoubt {
          layer. Check both"
     )]
     SenseContradicts,
+    /// Atoms beside several moirés.
+    #[error(
+        "the atoms beside the moirés were not used, since the image does not tell which of its moirés have the layer that shows. Say \
+         for each moiré which of its layers that is, or that it is none"
+    )]
+    RulerMoire,
     /// Readings of the moiré by the atoms beside it that the symmetry does not tell apart.
     #[error(
         "the atoms beside the moiré leave more than one twist open: {}. They are not used until the sense of the twist, or the \
@@ -189,11 +195,14 @@ explain! { OrientationDoubt:
         "The atoms beside the moiré may be those of either layer. The likelier one was taken: the upper layer, unless their size says \
          the other one."
         "Say which layer's atoms the image shows."
+    RulerMoire "ruler-moire-open" Note
+        "The image shows several moirés and the atoms of one layer. The atoms measure those moirés that this layer makes, and the image does \
+         not tell which these are."
+        "Say for each moiré which of its two layers shows its atoms, if one of them does."
     RulerReadings "ruler-readings-open" Warning
         "The layers differ, and the atoms of one of them fix the other only up to a symmetry: each reading that is listed has little \
          strain, and one of them is right. The twist that is reported is by the scanner, without the atoms."
-        "Give the sense of the twist, as the stacking was planned. Where the readings have the same sense, the one with the \
-         planned twist is right."
+        "Give the sense of the twist, from the record of the stacking."
     SenseOpen "twist-sense-open" Warning
         "The two layers are equal, and the orientation of one of them does not determine the sense of the twist. Both \
          solutions fit equally well and have different strain tensors."

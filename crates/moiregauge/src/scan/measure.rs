@@ -84,35 +84,37 @@ pub fn measure_moires(
     }
     let (background, method) = (settings.background, settings.method);
     let told = &settings.by_hand;
-    let find = |image: Image, geometry: &Geometry| match settings.moires {
-        0 | 1 => {
-            let find = |image: Image, geometry: &Geometry| {
-                if told.is_nothing() {
-                    measure_own(image, geometry, background, method)
-                } else {
-                    measure_by_hand(&image, geometry, background, method, meant(told))
-                }
+    let find = |image: Image, geometry: &Geometry| {
+        let one = |image, geometry: &Geometry| {
+            let found = if told.is_nothing() {
+                measure_own(image, geometry, background, method)
+            } else {
+                measure_by_hand(&image, geometry, background, method, meant(told))
             };
-            let mut layers = settings.ruler_layers();
-            layers.retain(|layer| atoms::may_show(geometry, layer));
-            let scene = atoms::Scene {
-                image: &image,
-                geometry,
-                background,
-                find: &find,
-            };
-            let both = scene.moire_with_atoms(&layers);
-            both.map_or_else(|| find(image, geometry), Ok)
-                .map(|lattice| vec![lattice])
-        }
-        n => {
-            // Several lattices are fitted together on a straight grid.
-            let plane = Geometry {
-                departure: None,
-                ..geometry.clone()
-            };
-            measure_several(&image, &plane, background, n)
-        }
+            found.map(|lattice| vec![lattice])
+        };
+        let several = |image, geometry: &Geometry| {
+            measure_several(&image, geometry, background, settings.moires)
+        };
+        // Several lattices are fitted together on a straight grid.
+        let plane = Geometry {
+            departure: None,
+            ..geometry.clone()
+        };
+        let (find, geometry): (Find, _) = match settings.moires {
+            0 | 1 => (&one, geometry),
+            _ => (&several, &plane),
+        };
+        let mut layers = settings.ruler_layers();
+        layers.retain(|layer| atoms::may_show(geometry, layer));
+        let scene = atoms::Scene {
+            image: &image,
+            geometry,
+            background,
+            find,
+        };
+        let both = scene.moires_with_atoms(&layers);
+        both.map_or_else(|| find(image, geometry), Ok)
     };
     measure_with(file, scan, settings, window, &find)
 }

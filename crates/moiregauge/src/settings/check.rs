@@ -311,10 +311,7 @@ mod tests {
             sigma_nm_per_min: -1.0,
         };
         assert!(refused(|s| s.drift = Some(drift)).starts_with("drift"));
-        let layers = MoireLayers {
-            material: Material::graphene(),
-            substrate: None,
-        };
+        let layers = MoireLayers::new(Material::graphene(), None);
         assert_eq!(
             refused(|s| s.moire_layers = vec![layers.clone(); 2]),
             "moire_layers"

@@ -122,6 +122,20 @@ pub struct MoireLayers {
     /// The lower layer (layer 1, the reference) where it is another one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub substrate: Option<Material>,
+    /// The layer of this moiré whose atoms the frames show; `None`: as for all of them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ruler: Option<RulerLayer>,
+}
+
+impl MoireLayers {
+    /// Of one material, or of two.
+    pub fn new(material: Material, substrate: Option<Material>) -> Self {
+        Self {
+            material,
+            substrate,
+            ruler: None,
+        }
+    }
 }
 
 /// Every knob of an analysis.
@@ -202,7 +216,8 @@ pub struct Settings {
     /// one, per cent, for the uncertainty budget. The moiré does not show it. The default is a guess, of
     /// the size of small uniaxial strains; up to 0.06 % the twist stays within 0.001°.
     pub isotropic_strain_percent: f64,
-    /// The layer whose atoms the frames show beside the moiré and which measures them in place of the scanner.
+    /// The layer whose atoms the frames show beside the moiré and which measures them in place of the scanner. Of several moirés, which need not have this
+    /// layer in common, only where it is said.
     pub ruler: RulerLayer,
     /// Standard deviation of the strain that this layer itself may have, along x and along y, per cent, for the uncertainty budget.
     pub ruler_strain_percent: f64,
@@ -226,6 +241,7 @@ impl Settings {
         if let Some(layers) = self.moire_layers.get(index) {
             own.material.clone_from(&layers.material);
             own.substrate.clone_from(&layers.substrate);
+            own.ruler = layers.ruler.unwrap_or(self.ruler);
         }
         own
     }
@@ -250,18 +266,40 @@ impl Settings {
 
     /// The layers whose atoms are looked for beside the moiré, which they hide: the upper one first, which most images show.
     pub fn ruler_layers(&self) -> Vec<&Material> {
-        let layers = self.bilayer();
         let reads_it =
             self.method == Method::Lattice && self.strain_convention == StrainConvention::RealSpace;
-        if !reads_it || self.moires > 1 {
+        if !reads_it {
             return Vec::new();
         }
-        match self.ruler {
-            RulerLayer::First => vec![layers.reference],
-            RulerLayer::Second => vec![layers.stretched],
-            _ if layers.is_equal() => vec![layers.stretched],
-            _ => vec![layers.stretched, layers.reference],
+        let one = [(self.ruler, &self.material, self.substrate.as_ref())];
+        let each = self.moire_layers.iter().map(|own| {
+            let ruler = own.ruler.unwrap_or(self.ruler);
+            (ruler, &own.material, own.substrate.as_ref())
+        });
+        let mut all: Vec<_> = each.collect();
+        if all.is_empty() {
+            all.extend(one);
         }
+        // What is said of one moiré holds for the frame.
+        let is_told = |ruler: RulerLayer| matches!(ruler, RulerLayer::First | RulerLayer::Second);
+        if all.iter().any(|(ruler, ..)| is_told(*ruler)) {
+            all.retain(|(ruler, ..)| is_told(*ruler));
+        }
+        let mut layers: Vec<&Material> = Vec::new();
+        for (ruler, upper, lower) in all {
+            let lower = lower.unwrap_or(upper);
+            let own = match ruler {
+                RulerLayer::First => vec![lower],
+                RulerLayer::Second => vec![upper],
+                _ => vec![upper, lower],
+            };
+            for layer in own {
+                if !layers.contains(&layer) {
+                    layers.push(layer);
+                }
+            }
+        }
+        layers
     }
 
     /// The two layers: `material` on itself or on the `substrate`.

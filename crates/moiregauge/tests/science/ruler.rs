@@ -7,8 +7,8 @@ use heterostrain::strain::{StrainTensor, TwistSense};
 use moiregauge::campaign::{Analysis, analyse};
 use moiregauge::map::TwistStrainMap;
 use moiregauge::meaning::Source;
-use moiregauge::scan::measure_scan;
-use moiregauge::settings::{GivenDrift, RulerLayer, Settings};
+use moiregauge::scan::{measure_moires, measure_scan, sorted_moires};
+use moiregauge::settings::{GivenDrift, MoireLayers, RulerLayer, Settings};
 use moiregauge::survey::{MapMethod, corrected_images, map_scan};
 use moiregauge::window::Resolution;
 use nalgebra::{Matrix2, Rotation2, Vector2};
@@ -343,4 +343,73 @@ fn different_layers_have_readings_of_which_the_sense_decides() {
     assert!(set.ruler.as_ref().unwrap().used && !told(&decided));
     let tensor = set.mean.as_ref().unwrap().readings.tensor.as_ref().unwrap();
     assert!(pulls(&tensor.in_all()).iter().all(|pull| pull.abs() < 4.0));
+}
+
+/// A layer between or on two others: its atoms measure both of its moirés, once it is said that it is a layer of both. A moiré of which it
+/// is none stays with the scanner.
+#[test]
+fn one_ruler_measures_two_moires() {
+    let twists = [TWIST, 0.095];
+    let first = Rotation2::new(0.4).into_inner();
+    let seen = waves(CONSTANT, &first);
+    // Layer 2 is the seen one, so that the other is turned back.
+    let others = twists.map(|twist| {
+        let f = Rotation2::new(twist).into_inner() * STRAIN;
+        waves(CONSTANT, &(f.try_inverse().unwrap() * first))
+    });
+    let shown = Shown {
+        frame: &scanner(1.03),
+        bow: 0.0,
+        atoms: 0.6,
+        seed: 4,
+        pixels: 256,
+        size: 18.0,
+    };
+    let scan = shown.scan(&seen, &others);
+    let found = |rulers: [RulerLayer; 2]| {
+        let of = |ruler| MoireLayers {
+            ruler: Some(ruler),
+            ..MoireLayers::new(Material::graphene(), None)
+        };
+        let settings = Settings {
+            drift_draws: 0,
+            strain_draws: 0,
+            moires: 2,
+            moire_layers: rulers.map(of).to_vec(),
+            ..Settings::default()
+        };
+        let moires = measure_moires("scan", &scan, &settings, None).unwrap();
+        let of_moire = |(i, scans)| analyse(scans, &settings.of_moire(i));
+        let sorted = sorted_moires(vec![moires]).into_iter().enumerate();
+        sorted.map(of_moire).collect::<Vec<Analysis>>()
+    };
+    let by_atoms = |found: &Analysis, twist: f64| {
+        let set = &found.sets[0];
+        assert!(set.ruler.as_ref().unwrap().used);
+        let mean = set.mean.as_ref().unwrap();
+        let own = mean.twist();
+        assert!(
+            (own.value - twist).abs() < 4.0 * own.total && own.total < 2e-3 * twist,
+            "{own:?} {twist}"
+        );
+        let strain = mean.readings.tensor.as_ref().unwrap().in_all().mean();
+        assert!(
+            (strain.value - 0.0015).abs() < 4.0 * strain.sigma && strain.sigma < 2e-4,
+            "{strain:?}"
+        );
+    };
+    let both = found([RulerLayer::Second; 2]);
+    for (found, twist) in both.iter().zip(twists) {
+        by_atoms(found, twist);
+    }
+    let [one, other] = &found([RulerLayer::Second, RulerLayer::Off])[..] else {
+        panic!("two moirés");
+    };
+    by_atoms(one, twists[0]);
+    assert!(other.sets[0].ruler.is_none());
+    for found in found([RulerLayer::Auto; 2]) {
+        assert!(!found.sets[0].ruler.as_ref().unwrap().used);
+        let mut codes = found.caveats.iter().map(moiregauge::caveat::Caveat::code);
+        assert!(codes.any(|code| code == "ruler-moire-open"));
+    }
 }

@@ -8,7 +8,7 @@ use crate::caveat::moires::MoireDoubt;
 use crate::caveat::orientation::{OrientationDoubt, SenseNumbers};
 use crate::caveat::sets::{Scattered, SetDoubt};
 use crate::meaning::about::caveats;
-use crate::settings::knobs::Settings;
+use crate::settings::knobs::{RulerLayer, Settings};
 
 /// χ²/dof beyond which the scatter of the scans deserves a word: errors wrong by 1.4.
 const LARGE_CHI2: f64 = 2.0;
@@ -26,7 +26,10 @@ pub(crate) fn about_set(
     about_mean(&set.name, set.mean.as_ref(), caveats);
     let shown = set.mean.as_ref().or(set.uncorrected.as_ref());
     let ruler = set.ruler.as_ref();
-    if let Some(layer) = ruler.and_then(|ruler| ruler.other_layer) {
+    let of_several = settings.moires > 1 && settings.ruler == RulerLayer::Auto;
+    if ruler.is_some() && of_several {
+        caveats.push(Caveat::new(OrientationDoubt::RulerMoire, &set.name));
+    } else if let Some(layer) = ruler.and_then(|ruler| ruler.other_layer) {
         caveats.push(Caveat::new(
             OrientationDoubt::RulerLayer { layer },
             &set.name,

@@ -137,12 +137,13 @@ pub(crate) fn analyse_set(
 }
 
 /// Whether the set is measured by its ruler: where its reading is decided and the user says so, or the layer is decided as well and the
-/// total uncertainty of the twist is smaller.
+/// total uncertainty of the twist is smaller. Which of several moirés have the layer whose atoms show is not decided.
 fn is_better(ruler: &Ruled, mean: Option<&SetMean>, settings: &Settings) -> bool {
     let total = |mean: &SetMean| mean.twist().total;
     let smaller = |mean: &SetMean| !(total(mean) <= total(&ruler.mean));
     let told = settings.ruler != RulerLayer::Auto;
-    let layer = told || (ruler.other_layer.is_none() && mean.is_none_or(smaller));
+    let decided = settings.moires < 2 && ruler.other_layer.is_none();
+    let layer = told || (decided && mean.is_none_or(smaller));
     layer && ruler.others().next().is_none()
 }
 

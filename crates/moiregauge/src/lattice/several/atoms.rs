@@ -1,6 +1,6 @@
-//! The moiré and the atoms of a layer in one image.
+//! The moirés and the atoms of a layer in one image.
 //!
-//! The atoms are looked for by their cell, the moiré in what is left without them. Where the moiré changes the height of the atoms
+//! The atoms are looked for by their cell, the moirés in what is left without them. Where the moiré changes the height of the atoms
 //! there are waves at `b ± m` as well, b of the atoms and m of the moiré: a few periods away from b, so that a fit of the atoms alone
 //! is drawn to them. They are taken off, and both lattices are measured once more in what the other and these waves leave.
 
@@ -47,13 +47,13 @@ const SAME_CELL: f64 = 0.1;
 /// Atoms whose waves are this near to whole numbers of waves of the moiré are harmonics of it: cycles per frame, below half a bin.
 const SAME: f64 = 0.3;
 
-/// An image and how its moiré is found.
+/// An image and how its moirés are found.
 pub(crate) struct Scene<'a> {
     pub(crate) image: &'a Image,
     pub(crate) geometry: &'a Geometry,
     pub(crate) background: Background,
-    /// Finds the moiré in an image without atoms.
-    pub(crate) find: &'a dyn Fn(Image, &Geometry) -> Result<MeasuredLattice, LatticeError>,
+    /// Finds the moirés in an image without atoms.
+    pub(crate) find: &'a dyn Fn(Image, &Geometry) -> Result<Vec<MeasuredLattice>, LatticeError>,
 }
 
 /// Whether pixels are fine enough to show the atoms of a layer.
@@ -73,14 +73,16 @@ pub(crate) fn is_of(lattice: &Lattice, material: &Material) -> bool {
 }
 
 impl Scene<'_> {
-    /// The moiré, with the atoms of one of the layers; `None` where the image does not show both.
-    pub(crate) fn moire_with_atoms(&self, layers: &[&Material]) -> Option<MeasuredLattice> {
+    /// The moirés, with the atoms of one of the layers; `None` where the image does not show both.
+    pub(crate) fn moires_with_atoms(&self, layers: &[&Material]) -> Option<Vec<MeasuredLattice>> {
         let flat = levelled(self.image.clone(), self.background).ok()?;
         let first = layers.iter().find_map(|layer| self.atoms(&flat, layer))?;
         let rest = without(&flat, &first);
-        let moire = self.coarse(&rest, &first)?;
-        let beside = satellites(&without(&flat, &moire), &first, &moire)?;
-        let mut others = without(&flat, &moire);
+        let moires = self.coarse(&rest, &first)?;
+        let mut others = moires
+            .iter()
+            .fold(flat.clone(), |rest, moire| without(&rest, moire));
+        let beside = satellites(&others, &first, &moires)?;
         take_off(&mut others, &beside);
         let atoms = self.again(&others, &first.reciprocal)?;
         let (atoms, _) = with_evidence(atoms, &others, self.geometry);
@@ -88,22 +90,32 @@ impl Scene<'_> {
         let of_layer =
             |layer: &&&Material| is_of(&atoms.pixels.in_nm(&self.geometry.pixel_to_nm), layer);
         layers.iter().find(of_layer)?;
-        if predicts.is_none_or(|least| least < PLAIN) || self.is_harmonic(&atoms, &moire) {
+        let harmonic = moires.iter().any(|moire| self.is_harmonic(&atoms, moire));
+        if predicts.is_none_or(|least| least < PLAIN) || harmonic {
             return None;
         }
         let mut rest = without(&flat, &atoms);
         take_off(&mut rest, &beside);
-        let same = |again: &MeasuredLattice| {
-            let ratio = again.pixels.basis.determinant() / moire.pixels.basis.determinant();
-            (ratio.abs() - 1.0).abs() < SAME_CELL
+        let known = |again: &MeasuredLattice| {
+            moires.iter().any(|moire| {
+                let ratio = again.pixels.basis.determinant() / moire.pixels.basis.determinant();
+                (ratio.abs() - 1.0).abs() < SAME_CELL
+            })
         };
+        let same = |again: &Vec<MeasuredLattice>| again.iter().all(known);
         let again = (self.find)(rest, self.geometry).ok().filter(same);
-        let mut found = again.unwrap_or(moire);
-        found.atoms = Some(Box::new(Atoms {
-            pixels: atoms.pixels,
-            predicts,
-            signal_to_noise: atoms.signal_to_noise,
-        }));
+        let mut found = match again {
+            // Several have the errors that they have beside each other.
+            None if moires.len() > 1 => return None,
+            again => again.unwrap_or(moires),
+        };
+        for moire in &mut found {
+            moire.atoms = Some(Box::new(Atoms {
+                pixels: atoms.pixels,
+                predicts,
+                signal_to_noise: atoms.signal_to_noise,
+            }));
+        }
         Some(found)
     }
 
@@ -147,15 +159,21 @@ impl Scene<'_> {
             })
     }
 
-    /// The moiré in what is left without the atoms, found in bins of their size.
-    fn coarse(&self, rest: &Image, atoms: &MeasuredLattice) -> Option<MeasuredLattice> {
+    /// The moirés in what is left without the atoms, found in bins of their size.
+    fn coarse(&self, rest: &Image, atoms: &MeasuredLattice) -> Option<Vec<MeasuredLattice>> {
         let longest = three(&atoms.reciprocal).map(|q| std::f64::consts::TAU / q.norm());
         let bin = longest.iter().fold(1.0f64, |a, b| a.max(*b)).ceil();
         let bins = rest.binned(bin as usize);
         let found = (self.find)(bins, &self.geometry.in_bins(bin as usize)).ok()?;
-        let found = self.again(rest, &(found.reciprocal / bin))?;
         let area = |lattice: &MeasuredLattice| lattice.pixels.basis.determinant().abs();
-        (area(&found) > LARGER * LARGER * area(atoms)).then_some(found)
+        let large = |moire: &MeasuredLattice| area(moire) > LARGER * LARGER * area(atoms);
+        let mut left = rest.clone();
+        let mut measured = |moire: MeasuredLattice| {
+            let found = self.again(&left, &(moire.reciprocal / bin)).filter(large)?;
+            left = without(&left, &found);
+            Some(found)
+        };
+        found.into_iter().map(&mut measured).collect()
     }
 
     fn again(&self, image: &Image, pair: &Matrix2<f64>) -> Option<MeasuredLattice> {
@@ -207,14 +225,21 @@ fn summits(spectrum: &Spectrum, among: impl Fn(&Vector2<f64>) -> bool) -> Vec<(f
     found
 }
 
-/// The waves `b ± m` of two shells of the moiré about each first wave of the atoms: `Σ Re c e^{iq·n}` on the pixels, amplitudes by
+/// The waves `b ± m` of two shells of each moiré about each first wave of the atoms: `Σ Re c e^{iq·n}` on the pixels, amplitudes by
 /// least squares with those of the atoms.
-fn satellites(image: &Image, atoms: &MeasuredLattice, moire: &MeasuredLattice) -> Option<Vec<f64>> {
+fn satellites(
+    image: &Image,
+    atoms: &MeasuredLattice,
+    moires: &[MeasuredLattice],
+) -> Option<Vec<f64>> {
     let centres = three(&atoms.reciprocal);
-    let around = shells(2).iter().flat_map(|index| {
-        let m = moire.reciprocal * Vector2::from(index.map(f64::from));
-        [m, -m]
-    });
+    let shells = shells(2);
+    let of_moire = |moire: &MeasuredLattice| {
+        let pair = moire.reciprocal;
+        let wave = move |index: &[i32; 2]| pair * Vector2::from(index.map(f64::from));
+        shells.iter().map(wave)
+    };
+    let around = moires.iter().flat_map(of_moire).flat_map(|m| [m, -m]);
     let around: Vec<Vector2<f64>> = around.collect();
     let beside = centres
         .iter()
