@@ -20,6 +20,7 @@ import numpy
 HEX = {"graphene": 0.246, "hBN": 0.2504, "WSe2": 0.3282, "WS2": 0.3153}
 LINE_TIME = 0.1
 DRIFT = 0.3  # nm/min, where it is in nm/min.
+NO_ATOMS = ("none", "harmonics", "grid", "root3", "adsorbate")
 
 def turn(angle):
     return numpy.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
@@ -37,6 +38,8 @@ class Frame:
         upper, lower = {"gbn": ("graphene", "hBN"), "tmd": ("WSe2", "WS2")}.get(kind.split("-")[0], ("graphene", "graphene"))
         self.layers, self.seen = (upper, lower), 1 if kind.endswith("-1") else 2
         twist = {"gbn": draw(0, 2), "tmd": draw(0.5, 4)}.get(kind.split("-")[0], draw(1.4, 4.5))
+        if kind == "harmonics":  # They reach the waves of the atoms where cells are small.
+            twist *= 2
         normal = lambda sigma: sigma * self.random.normal()
         own = numpy.eye(2) + numpy.array([[normal(0.001), 0], [0, normal(0.001)]])
         own[0, 1] = own[1, 0] = normal(0.0007)
@@ -61,7 +64,7 @@ class Frame:
         n = (numpy.arange(self.columns) + 0.5) * pitch
         x, y = numpy.meshgrid(n, n)
         # Where the tip is over the sample, for where the scanner says that it is.
-        gain, mismatch, skew = normal(0.02 if kind != "none" else 0), normal(0.01), normal(0.005)
+        gain, mismatch, skew = normal(0.02), normal(0.01), normal(0.005)
         d = numpy.array([[gain + mismatch / 2, skew / 2], [skew / 2, gain - mismatch / 2]])
         # Per time of the frame, 1 % of its slow speed; or the same drift in nm/min as in the frame of the atoms.
         share = DRIFT / 60 * LINE_TIME * self.columns / self.size if kind == "from" else 0.01
@@ -70,9 +73,10 @@ class Frame:
         true -= numpy.outer(drift, y.ravel())
         phase = lambda q: (q @ true).reshape(x.shape)
         m = sum(numpy.cos(phase(q) + c) for q, c in zip(moire, self.at(moire, draw)))
-        sharp = draw(0, 0.5)
+        sharp = draw(1, 3) if kind == "harmonics" else draw(0, 0.5)
         image = (numpy.exp(sharp * m) - 1) / sharp if sharp > 0.05 else m
-        if kind not in ("none", "from"):
+        image = image / image.std() * math.sqrt(1.5) if kind == "harmonics" else image
+        if kind not in (*NO_ATOMS, "from"):
             of = b[self.seen - 1]
             atoms = sum(numpy.cos(phase(q) + c) for q, c in zip(of, self.at(of, draw)))
             if self.random.random() < 0.5:
@@ -83,9 +87,17 @@ class Frame:
                 image = image + draw(0.05, 0.2) * sum(numpy.cos(phase(q) + c) for q, c in zip(of, self.at(of, draw)))
         image = image + draw(0, 0.8) * self.random.normal(size=image.shape) + draw(0, 0.3) * self.random.normal(size=(len(n), 1))
         image = image + draw(-2, 2) * x / self.size + draw(-2, 2) * y / self.size
-        if kind == "none" and self.random.random() < 0.5:  # A regular grid of the electronics, or an adsorbate.
-            q = waves(draw(0.24, 0.30), numpy.diag([1, draw(1.15, 1.6)])) if self.random.random() < 0.5 else waves(0.246 * draw(1.12, 2.2), turn(draw(0, 3)))
-            image = image + draw(0.1, 0.6) * sum(numpy.cos(phase(k)) for k in q)
+        if kind == "grid":  # Of the electronics: at rest in the pixels, of a rectangle of about the atoms.
+            a, b = (2 * math.pi / draw(0.19, 0.30, 2)) if self.random.random() < 0.5 else [2 * math.pi / draw(0.19, 0.30)] * 2
+            image = image + draw(0.1, 0.6) * (numpy.cos(a * x + draw(0, 6)) + numpy.cos(b * y + draw(0, 6)))
+        if kind == "root3":  # √3 × √3 R30° on the upper layer, in half of the frames with second harmonics.
+            q = waves(math.sqrt(3) * HEX[upper], between @ own @ turn(orientation + math.pi / 6))
+            at = self.at(q, draw)
+            second = draw(0.1, 0.4) if self.random.random() < 0.5 else 0
+            image = image + draw(0.1, 0.8) * sum(numpy.cos(phase(k) + c) + second * numpy.cos(2 * (phase(k) + c)) for k, c in zip(q, at))
+        if kind == "adsorbate":  # Hexagonal, of 1.2 to 3 times the constant of the layer.
+            q = waves(HEX[upper] * draw(1.2, 3), turn(draw(0, 3)))
+            image = image + draw(0.1, 0.8) * sum(numpy.cos(phase(k)) for k in q)
         self.image = 1e-10 * image
         self.atoms = None
         if kind == "from":
@@ -147,17 +159,25 @@ def run(program, first, last, written, *rest):
 
 def table(*files):
     lines = [json.loads(line) for file in files for line in open(file)]
-    print("| kind | frames | by the atoms | by the scanner | no twist | median error (%) | largest (%) | median total (%) | rms error / total | sign of the mean strain | by the scanner: rms error / total |")
-    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
+    print("| kind | frames | by the atoms | by the scanner | no twist | median error (%) | largest (%) | median total (%) | rms error / total | sign of the mean strain | by the scanner: rms error / total | its readings by the atoms: the truth among them within 3 σ |")
+    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
     for kind in dict.fromkeys(line["kind"] for line in lines):
         of, found, signs = [l for l in lines if l["kind"] == kind], {True: [], False: []}, []
+        listed = []
         for line in of:
             of_set = (line.get("sets") or [{}])[0]
             mean = of_set.get("mean")
             if mean is None or mean.get("twist_deg") is None:
                 continue
-            ruled = (of_set.get("ruler") or {}).get("used", False)
+            ruler = of_set.get("ruler") or {}
+            ruled = ruler.get("used", False)
             truth, twist = line["truth"]["twist"], mean["twist_deg"]
+            if twist.get("sigma_total") is None:
+                continue
+            if ruler and not ruled:
+                tensor = ruler["mean"]["readings"]["strain_tensor"]
+                offs = [(r["twist_deg"]["value"] - truth) / r["twist_deg"]["sigma_total"] for r in [tensor, *tensor["alternatives"]]]
+                listed.append([min(offs, key=abs), 1])
             found[ruled].append([100 * abs(twist["value"] - truth) / truth, 100 * twist["sigma_total"] / truth])
             if ruled and abs(line["truth"]["mean"]) > 0.03:
                 signs.append((mean["readings"]["strain_tensor"]["mean_strain_percent"]["value"] > 0) == (line["truth"]["mean"] > 0))
@@ -166,7 +186,9 @@ def table(*files):
         e, t = numpy.array(by).T if by else (numpy.zeros(1), numpy.zeros(1))
         numbers = f"{numpy.median(e):.3f} | {e.max():.3f} | {numpy.median(t):.3f} | {rms(by)} | {sum(signs)} of {len(signs)}" if by else "– | – | – | – | –"
         none = len(of) - len(by) - len(found[False])
-        print(f"| {kind} | {len(of)} | {len(by)} | {len(found[False])} | {none} | {numbers} | {rms(found[False])} |")
+        inside = sum(abs(off) < 3 for off, _ in listed)
+        among = f"{inside} of {len(listed)}" if listed else "–"
+        print(f"| {kind} | {len(of)} | {len(by)} | {len(found[False])} | {none} | {numbers} | {rms(found[False])} | {among} |")
 
 if __name__ == "__main__":
     table(*sys.argv[2:]) if sys.argv[1] == "table" else run(*sys.argv[1:])

@@ -4,8 +4,8 @@
 #   docs/ruler.sh PROGRAM FIRST LAST OUT.jsonl [KIND…] [--ruler=1|2|auto|off] [--twist-sense=positive]
 #   docs/ruler.sh table OUT.jsonl…                          (a Markdown table)
 #
-# Kinds: tbg (atoms of the upper layer), tbg-1 (of the lower one), gbn, gbn-1 (graphene on hBN), tmd, tmd-1 (WSe₂ on WS₂), none (no atoms), from (no
-# atoms, but those of another frame: --ruler-from).
+# Kinds: tbg (atoms of the upper layer), tbg-1 (of the lower one), gbn, gbn-1 (graphene on hBN), tmd, tmd-1 (WSe₂ on WS₂), none (no atoms),
+# harmonics, grid, root3, adsorbate (none, but what may be taken for them), from (none, but those of another frame: --ruler-from).
 # Needs NumPy. PYTHON (python3) and JOBS (1) can be set; KEEP=FOLDER keeps images and results there.
 set -euo pipefail
 export OPENBLAS_NUM_THREADS="${OPENBLAS_NUM_THREADS:-1}"

@@ -81,6 +81,7 @@ moires = 1
 #   [[moire_layers]]
 #   material = "graphene"
 #   substrate = "hBN"
+#   ruler = "off"   # of this moiré, if it differs from that below
 
 # The orientation of one of the layers in the frame of the scans, if it is known: of layer 1 (the lower
 # one, the reference) or 2, of its atomic vector ("atomic": a row of atoms, a zigzag edge) or of its

@@ -158,6 +158,8 @@ fn put(all: &mut Value, given: Value) {
 
 #[cfg(test)]
 mod tests {
+    use moiregauge::settings::RulerLayer;
+
     use super::*;
 
     fn settings(options: &str) -> Result<Settings, String> {
@@ -176,6 +178,26 @@ mod tests {
             let text = serde_json::to_string(&all).unwrap();
             assert_eq!(settings(&text), Ok(all));
         }
+    }
+
+    #[test]
+    fn each_moire_has_its_layers_and_its_ruler() {
+        let given = r#"{"moires": 2, "moire_layers": [{"layers": "graphene/hBN", "ruler": "off"}, "graphene"], "ruler": "2"}"#;
+        let found = settings(given).unwrap();
+        let of = |moire: usize| {
+            let own = found.of_moire(moire);
+            (own.bilayer().name(), own.ruler)
+        };
+        let upper_on_lower = found.moire_layers[0].substrate.is_some();
+        assert!(upper_on_lower && of(0).1 == RulerLayer::Off);
+        assert_eq!(of(1), ("graphene".to_owned(), RulerLayer::Second));
+        // Only the atoms of the moiré that has a ruler are looked for.
+        let looked_for: Vec<&str> = found
+            .ruler_layers()
+            .iter()
+            .map(|l| l.name.as_str())
+            .collect();
+        assert_eq!(looked_for, ["graphene"]);
     }
 
     #[test]

@@ -66,7 +66,7 @@ class Options(TypedDict, total=False):
     overlap: Use only the region that all scans of a set have in common.
     rotation_deg: Angle by which the fast axis is turned against x, degrees, counter-clockwise.
     ruler: The layer whose atoms the frames show beside the moiré and which measures them in place of the
-        scanner.
+        scanner. Of several moirés, which need not have this layer in common, only where it is said.
     ruler_from: Frames of the same scanner that show the atoms of a layer, at another magnification: they
         calibrate it, in place of `scanner`. Of layer 2, or of that which `ruler` names.
     ruler_magnification_percent: Standard deviation of the change of the gain along x and along y between the

@@ -1010,6 +1010,8 @@ class MoireLayers(Document):
 
     material: Material
     """Both layers, or the upper one (layer 2) where there is a `substrate`."""
+    ruler: RulerLayer | None = None
+    """The layer of this moiré whose atoms the frames show; `None`: as for all of them."""
     substrate: Material | None = None
     """The lower layer (layer 1, the reference) where it is another one."""
 
@@ -1598,6 +1600,7 @@ class Settings(Document):
     """Use only the region that all scans of a set have in common."""
     ruler: RulerLayer
     """The layer whose atoms the frames show beside the moiré and which measures them in place of the scanner.
+    Of several moirés, which need not have this layer in common, only where it is said.
     """
     ruler_magnification_percent: float
     """Standard deviation of the change of the gain along x and along y between the frames of `ruler_from` and

@@ -12,7 +12,7 @@ use crate::frame::polygon;
 use crate::lattice::by_hand::{Meant, measure_by_hand};
 use crate::lattice::find::measure_own;
 use crate::lattice::measured::MeasuredLattice;
-use crate::lattice::several::atoms;
+use crate::lattice::several::atoms::{self, Find};
 use crate::lattice::several::together::measure_several;
 use crate::lattice::start::Start;
 use crate::numbers::interrupt;
@@ -31,7 +31,6 @@ use crate::scan::scanner::about_calibration;
 use crate::scan::shared::correlation;
 use crate::settings::by_hand::ByHand;
 use crate::settings::knobs::Settings;
-use crate::spectrum::error::LatticeError;
 
 /// Bytes of memory that the analysis of an image takes for each of its pixels at most: measured with 2048 × 2048
 /// single-precision samples and eight pixels per period, where nothing can be binned.
@@ -118,9 +117,6 @@ pub fn measure_moires(
     };
     measure_with(file, scan, settings, window, &find)
 }
-
-/// How the lattices of an image are found and measured; at least one.
-type Find<'a> = &'a dyn Fn(Image, &Geometry) -> Result<Vec<MeasuredLattice>, LatticeError>;
 
 fn measure_with(
     file: &str,

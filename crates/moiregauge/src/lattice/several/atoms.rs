@@ -47,13 +47,17 @@ const SAME_CELL: f64 = 0.1;
 /// Atoms whose waves are this near to whole numbers of waves of the moiré are harmonics of it: cycles per frame, below half a bin.
 const SAME: f64 = 0.3;
 
+/// How the lattices of an image are found and measured; at least one.
+pub(crate) type Find<'a> =
+    &'a dyn Fn(Image, &Geometry) -> Result<Vec<MeasuredLattice>, LatticeError>;
+
 /// An image and how its moirés are found.
 pub(crate) struct Scene<'a> {
     pub(crate) image: &'a Image,
     pub(crate) geometry: &'a Geometry,
     pub(crate) background: Background,
     /// Finds the moirés in an image without atoms.
-    pub(crate) find: &'a dyn Fn(Image, &Geometry) -> Result<Vec<MeasuredLattice>, LatticeError>,
+    pub(crate) find: Find<'a>,
 }
 
 /// Whether pixels are fine enough to show the atoms of a layer.
