@@ -66,7 +66,7 @@ pub enum OrientationDoubt {
     /// Atoms beside several moirés.
     #[error(
         "the atoms beside the moirés were not used, since the image does not tell which of its moirés have the layer that shows. Say \
-         for each moiré which of its layers that is, or that it is none"
+         for each moiré which of its layers that is, if it is one of them"
     )]
     RulerMoire,
     /// Readings of the moiré by the atoms beside it that the symmetry does not tell apart.

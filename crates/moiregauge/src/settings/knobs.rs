@@ -280,7 +280,7 @@ impl Settings {
         if all.is_empty() {
             all.extend(one);
         }
-        // What is said of one moiré holds for the frame.
+        // What one moiré has is in the whole frame.
         let is_told = |ruler: RulerLayer| matches!(ruler, RulerLayer::First | RulerLayer::Second);
         if all.iter().any(|(ruler, ..)| is_told(*ruler)) {
             all.retain(|(ruler, ..)| is_told(*ruler));

@@ -345,8 +345,8 @@ fn different_layers_have_readings_of_which_the_sense_decides() {
     assert!(pulls(&tensor.in_all()).iter().all(|pull| pull.abs() < 4.0));
 }
 
-/// A layer between or on two others: its atoms measure both of its moirés, once it is said that it is a layer of both. A moiré of which it
-/// is none stays with the scanner.
+/// A layer between or on two others: its atoms measure both of its moirés, once it is told that it is a layer of both. A moiré of
+/// other layers stays with the scanner.
 #[test]
 fn one_ruler_measures_two_moires() {
     let twists = [TWIST, 0.095];
