@@ -80,7 +80,6 @@ fit/closure NOISE_KNOWN_TO few,noisy,contrast root double
 fit/leverage ACROSS few,noisy,contrast half double
 fit/places CHANCE bump,few,noisy half double
 fit/places NEAR bump,few,noisy half double
-fit/noise FOREIGN moirés,gradient,grains half double
 fit/model CLIP few,noisy,contrast half double
 fit/lines BAD few,noisy,contrast half double
 several/together WEAKEST moirés half double

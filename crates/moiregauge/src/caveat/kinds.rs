@@ -139,7 +139,7 @@ fn of_lattice(doubt: &LatticeDoubt) -> Option<f64> {
         LatticeDoubt::PartOfCell { part: other, .. } | LatticeDoubt::OtherLattice { other, .. } => {
             Some(other.share)
         }
-        LatticeDoubt::SecondLattice { significance, .. } => Some(*significance),
+        LatticeDoubt::SecondLattice { strength, .. } => Some(*strength),
         _ => None,
     }
 }

@@ -143,17 +143,17 @@ pub enum LatticeDoubt {
     },
     /// There is another wave.
     #[error(
-        "the residual of the fit shows a wave that does not belong to the lattice. Possible causes: a second moiré, \
-         interference, or a lattice that varies across the frame. If the image shows two moirés, measure both (period \
-         {period:.2} nm, {significance:.0} times the noise around it; up to {threshold:.0} is consistent with noise)"
+        "a wave with a period of {period:.2} nm does not belong to the lattice: a second moiré, or interference. If the \
+         image shows two moirés, measure both (its amplitude is {strength:.2} of that of the weakest wave of the lattice; \
+         it predicts held-out parts of the image by {predicts:.1} standard errors)"
     )]
     SecondLattice {
         /// Its period, nm.
         period: f64,
-        /// Its power over that of the noise.
-        significance: f64,
-        /// What can be chance.
-        threshold: f64,
+        /// Its amplitude over that of the weakest first-order wave of the lattice.
+        strength: f64,
+        /// By how many standard errors it improves the prediction of held-out blocks.
+        predicts: f64,
     },
     /// The published method was asked for.
     #[error(
@@ -305,7 +305,7 @@ explain! { LatticeDoubt:
         "Look at the Fourier transform of the image. Give the approximate wavelength of the right lattice, or measure two moirés."
     SecondLattice "second-lattice" Note
         "The image shows a wave, well above the noise, that does not belong to the lattice. It may come from a second \
-         moiré, from interference, or from a lattice that changes across the frame."
+         moiré or from interference."
         "Look at the Fourier transform of the image. If the image shows two moirés, measure both."
     MethodPaperBias "method-paper-bias" Warning
         "The published method gives lattice vectors that are about one per cent too short, and a twist that is too \

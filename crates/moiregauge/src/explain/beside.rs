@@ -6,13 +6,18 @@
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Matrix2, Vector2};
+use rustfft::num_complex::Complex64;
+use serde::{Deserialize, Serialize};
 
-use crate::explain::normal::Phases;
+use crate::explain::cells::BETTER;
+use crate::explain::evidence::Blocks;
+use crate::explain::normal::{Phases, gains};
 use crate::explain::scene::Scene;
 use crate::frame::image::Image;
+use crate::numbers::exact;
 use crate::numbers::median::median;
 use crate::spectrum::error::SECOND;
-use crate::spectrum::shells::FIRST_SHELL;
+use crate::spectrum::shells::{FIRST_SHELL, shells};
 use crate::spectrum::transform::Spectrum;
 
 /// Waves that are taken off, at most: stripes with an overtone, and hum beside them.
@@ -31,6 +36,67 @@ const FASTEST: f64 = 0.9 * PI;
 const SLOWEST: f64 = 2.0;
 /// Fewest cycles along a line: what whole lines do has fewer.
 const LINES: i64 = 2;
+/// Reach of the search for a wave vector, cycles per frame, in steps of a fifth of that.
+const REACH: f64 = 1.0;
+
+/// A wave that a lattice does not explain.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct WaveBeside {
+    /// Its wave vector, rad per pixel.
+    #[serde(with = "exact")]
+    pub wave_vector: Vector2<f64>,
+    /// Its amplitude over that of the weakest first-order wave of the lattice.
+    #[serde(with = "exact")]
+    pub strength: f64,
+    /// By how many standard errors it improves the prediction of blocks of the frame that were held out.
+    #[serde(with = "exact")]
+    pub predicts: f64,
+}
+
+/// The wave beside a lattice (reciprocal pair, rad per pixel) that predicts best, if it is not chance. `bends`: phases may be cubic polynomials.
+pub(crate) fn wave_beside(image: &Image, pair: &Matrix2<f64>, bends: bool) -> Option<WaveBeside> {
+    let scene = Scene::new(image, pair, pair)?;
+    let indices = shells(3);
+    let lattice = Phases::shown(&scene, pair * scene.binning as f64, bends);
+    let rest = lattice.residual(&scene, indices)?;
+    let powers = scene.powers(&lattice.straightened(&scene, &rest));
+    let own = (lattice.pair, lattice.pair.try_inverse());
+    let mut peaks: Vec<_> = powers
+        .iter()
+        .filter(|(q, _)| scene.to_nearest(q, &own) > SKIRT)
+        .collect();
+    peaks.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let mut waves: Vec<Vector2<f64>> = Vec::new();
+    for (q, _) in peaks {
+        if waves.iter().all(|other| scene.cycles(q - other) > SKIRT) {
+            waves.push(*q);
+        }
+        if waves.len() == MOST {
+            break;
+        }
+    }
+    let beside = waves.into_iter().filter_map(|q| {
+        let mut with = lattice.clone();
+        with.others = vec![strongest_near(&scene, &lattice, &rest, q)];
+        let normals = with.normals(&scene, indices);
+        let all: Vec<usize> = (0..2 * indices.len() + 2).collect();
+        let gain = gains(&normals, &all)?;
+        let without = gains(&normals, &all[..2 * indices.len()])?;
+        let amplitudes = Phases::amplitudes(&normals)?;
+        let first = FIRST_SHELL.iter().filter_map(|index| {
+            let at = indices.iter().position(|other| other == index)?;
+            Some(amplitudes[at])
+        });
+        Some(WaveBeside {
+            wave_vector: with.others[0] / scene.binning as f64,
+            strength: amplitudes[indices.len()] / first.fold(f64::INFINITY, f64::min),
+            predicts: Blocks::difference(&scene, &gain, &without).standard_errors(),
+        })
+    });
+    let best = beside.max_by(|a, b| a.predicts.total_cmp(&b.predicts))?;
+    (best.predicts > BETTER).then_some(best)
+}
 
 impl Scene {
     /// The same without the waves beside a lattice (reciprocal pair, rad per bin; its harmonics are `indices`) that are as strong as the weakest of its
@@ -41,17 +107,36 @@ impl Scene {
         strong: &Matrix2<f64>,
         indices: &[[i32; 2]],
     ) -> Self {
+        if let Some(taken) = self.waves_beside(pair, strong, indices) {
+            let values = self.values.iter_mut().zip(taken);
+            values.for_each(|(value, taken)| *value -= taken);
+        }
+        self
+    }
+
+    /// The sum of the waves beside a lattice.
+    fn waves_beside(
+        &self,
+        pair: &Matrix2<f64>,
+        strong: &Matrix2<f64>,
+        indices: &[[i32; 2]],
+    ) -> Option<Vec<f64>> {
         let wave = |[h, k]: &[i32; 2]| pair * Vector2::new(f64::from(*h), f64::from(*k));
         let all = self.powers(&self.values);
-        let of_first = FIRST_SHELL.iter().map(wave).map(|first| {
-            let own = all.iter().filter(|(q, _)| self.cycles(q - first) < LOBE);
+        let power_at = |q: Vector2<f64>| {
+            let own = all.iter().filter(|(k, _)| self.cycles(k - q) < LOBE);
             own.map(|(_, power)| *power).fold(0.0, f64::max)
-        });
-        let least = of_first.fold(f64::INFINITY, f64::min);
-        let lattices = [pair, strong].map(|pair| (*pair, pair.try_inverse()));
+        };
+        let weakest = |shell: &[[i32; 2]]| {
+            let powers = shell.iter().map(|index| power_at(wave(index)));
+            powers.fold(f64::INFINITY, f64::min)
+        };
+        let least = weakest(&FIRST_SHELL);
+        let inverted = |pair: &Matrix2<f64>| (*pair, pair.try_inverse());
+        let (own, skirts) = (inverted(pair), inverted(strong));
         let strongest = |powers: &[(Vector2<f64>, f64)]| {
             let is_other = |q: &Vector2<f64>| {
-                self.to_nearest(q, &lattices[0]) > LOBE && self.to_nearest(q, &lattices[1]) > SKIRT
+                self.to_nearest(q, &own) > LOBE && self.to_nearest(q, &skirts) > SKIRT
             };
             let stands_out = |(q, power): &&(Vector2<f64>, f64)| {
                 let around = powers
@@ -71,13 +156,9 @@ impl Scene {
             let mut others = others.into_iter().take(LOOKED_AT);
             others.find(stands_out).map(|(q, _)| *q)
         };
-        if strongest(&all).is_none() {
-            return self;
-        }
+        strongest(&all)?;
         let lattice = Phases::straight(*pair);
-        let Some(values) = lattice.residual(&self, indices) else {
-            return self;
-        };
+        let values = lattice.residual(self, indices)?;
         let rest = Self {
             values,
             ..self.clone()
@@ -95,9 +176,7 @@ impl Scene {
             waves = fitted.unwrap_or(waves);
         }
         let taken = rest.values.iter().zip(&left).map(|(all, left)| all - left);
-        let values = self.values.iter_mut().zip(taken);
-        values.for_each(|(value, taken)| *value -= taken);
-        self
+        Some(taken.collect())
     }
 
     /// Distance of a wave vector from the nearest point of a lattice (reciprocal pair, rad per bin, and its inverse), cycles per frame.
@@ -135,4 +214,36 @@ impl Scene {
             |(q, _): &(Vector2<f64>, f64)| self.cycles(*q) > SLOWEST && q.abs().max() < FASTEST;
         bins.map(wave).filter(counts).collect()
     }
+}
+
+/// The wave vector (rad per bin) with the most power near a given one, of waves that bend as a lattice does.
+pub(crate) fn strongest_near(
+    scene: &Scene,
+    lattice: &Phases,
+    values: &[f64],
+    q: Vector2<f64>,
+) -> Vector2<f64> {
+    let step = scene.half.map(|half| TAU / (2.0 * half)) * (REACH / 5.0);
+    let rows = values.len() / scene.columns;
+    let values = lattice.unbent(scene, values, q);
+    let power = |q: &Vector2<f64>| {
+        let mut sum = Complex64::default();
+        let (turn_re, turn_im) = (q.x.cos(), q.x.sin());
+        for row in 0..rows {
+            let start = q.y * (row as f64 - scene.middle.y) - q.x * scene.middle.x;
+            let (mut c, mut s) = (start.cos(), start.sin());
+            for value in &values[row * scene.columns..(row + 1) * scene.columns] {
+                sum += value * Complex64::new(c, -s);
+                (c, s) = (c * turn_re - s * turn_im, s * turn_re + c * turn_im);
+            }
+        }
+        sum.norm_sqr()
+    };
+    let grid =
+        (-5..=5).flat_map(|i| (-5..=5).map(move |j| Vector2::new(f64::from(i), f64::from(j))));
+    let near = grid.map(|at| q + at.component_mul(&step));
+    let best = near
+        .map(|q| (power(&q), q))
+        .max_by(|a, b| a.0.total_cmp(&b.0));
+    best.map_or(q, |(_, q)| q)
 }

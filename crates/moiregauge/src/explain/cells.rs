@@ -4,12 +4,12 @@
 //! that they have not seen, in all three directions, and lie on its points: a second moiré that only comes near them does not belong to it.
 
 use std::cell::OnceCell;
-use std::f64::consts::TAU;
 
 use heterostrain::lattice::shortest_pair;
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 
+use crate::explain::beside::strongest_near;
 use crate::explain::evidence::{Blocks, gain, weakest};
 use crate::explain::normal::{Phases, gains};
 use crate::explain::scene::Scene;
@@ -28,9 +28,6 @@ const LONGEST: f64 = 2.1;
 pub(crate) const BETTER: f64 = 4.0;
 /// The smaller cell is taken if it predicts this fraction of what the larger does: the larger one has waves that are not its own.
 pub(crate) const MOST: f64 = 0.5;
-/// Reach of the search for wave vectors around the points, cycles per frame, in steps of a fifth of that.
-const REACH: f64 = 1.0;
-
 /// Cells whose shortest and longest waves differ by more than this are compared with those of twice the area: a hexagonal lattice without every other
 /// row has a ratio of two.
 const ELONGATED: f64 = 1.5;
@@ -76,13 +73,23 @@ pub(crate) struct Nested {
     pub(crate) larger: Option<(Matrix2<f64>, f64)>,
 }
 
-/// Compares the lattice of `pair` (reciprocal, rad per pixel) with those of larger and smaller cells.
-pub(crate) fn better_cell(image: &Image, pair: &Matrix2<f64>) -> Nested {
+/// Compares the lattice of `pair` (reciprocal, rad per pixel) with those of larger and smaller cells. `bends`: phases may be cubic polynomials.
+pub(crate) fn better_cell(image: &Image, pair: &Matrix2<f64>, bends: bool) -> Nested {
     let all = [Supercell::Root3, Supercell::Double];
     let elongated = is_elongated(pair);
     let rows = (0..3).map(Supercell::Rows).filter(|_| elongated);
     let all = all.into_iter().chain(rows);
     let mut larger: Option<(Matrix2<f64>, f64)> = None;
+    // Shown by straight waves or, where the lattice changes, by bent ones.
+    let shows = |coarse: &Matrix2<f64>, supercell| {
+        let straight = superlattice(image, coarse, supercell, false);
+        let bent = || superlattice(image, coarse, supercell, true);
+        if bends && straight != Some(Superlattice::Shown) {
+            bent()
+        } else {
+            straight
+        }
+    };
     let mut is_shown = |coarse: &Matrix2<f64>, said: Option<Superlattice>| match said {
         Some(Superlattice::NotShown(by)) => {
             if by > larger.map_or(0.0, |(_, most)| most) {
@@ -96,7 +103,7 @@ pub(crate) fn better_cell(image: &Image, pair: &Matrix2<f64>) -> Nested {
     let coarse = coarse.filter_map(|supercell| Some((supercell, supercell.coarse(pair)?)));
     let coarse: Vec<(Supercell, Matrix2<f64>)> = coarse.collect();
     let said = coarse.par_iter();
-    let said = said.map(|(supercell, coarse)| superlattice(image, coarse, *supercell));
+    let said = said.map(|(supercell, coarse)| shows(coarse, *supercell));
     let mut said = coarse.iter().zip(said.collect::<Vec<_>>());
     let shown = said.find(|((_, coarse), said)| is_shown(coarse, *said));
     let shown = shown.map(|(shown, _)| *shown);
@@ -106,8 +113,9 @@ pub(crate) fn better_cell(image: &Image, pair: &Matrix2<f64>) -> Nested {
         fine.find(|(supercell, fine)| {
             // Moirés of hexagonal layers are nearly hexagons: half-order waves in one direction make a superlattice of one.
             let is_regular = elongated && !is_elongated(fine);
-            predicts_as_well(image, fine, *own.get_or_init(|| gain(image, pair))) == Some(true)
-                && (is_regular || !is_shown(pair, superlattice(image, pair, *supercell)))
+            let share = *own.get_or_init(|| gain(image, pair, bends));
+            predicts_as_well(image, fine, share, bends) == Some(true)
+                && (is_regular || !is_shown(pair, shows(pair, *supercell)))
         })
     });
     let better = better.map(|(_, pair)| pair);
@@ -125,9 +133,14 @@ fn is_elongated(pair: &Matrix2<f64>) -> bool {
 }
 
 /// Whether one lattice alone predicts most of what another does, the share `other` of the variance.
-fn predicts_as_well(image: &Image, one: &Matrix2<f64>, other: Option<f64>) -> Option<bool> {
-    let enough = gain(image, one)? > MOST * other?;
-    Some(enough && weakest(image, one, false)? > BETTER)
+fn predicts_as_well(
+    image: &Image,
+    one: &Matrix2<f64>,
+    other: Option<f64>,
+    bends: bool,
+) -> Option<bool> {
+    let enough = gain(image, one, bends)? > MOST * other?;
+    Some(enough && weakest(image, one, bends)? > BETTER)
 }
 
 /// What an image shows of the superlattice.
@@ -141,11 +154,12 @@ pub(crate) enum Superlattice {
 }
 
 /// Whether an image shows the lattice with the larger cell and not only that with the smaller. `coarse`: reciprocal pair of the larger cell, at 60°,
-/// rad per pixel; `image`: without its background. `None` where the two cannot be compared.
+/// rad per pixel; `image`: without its background; `bends`: phases may be cubic polynomials. `None` where the two cannot be compared.
 pub(crate) fn superlattice(
     image: &Image,
     coarse: &Matrix2<f64>,
     supercell: Supercell,
+    bends: bool,
 ) -> Option<Superlattice> {
     let fine = supercell.fine(coarse);
     let scene = Scene::new(image, coarse, &fine)?;
@@ -166,9 +180,9 @@ pub(crate) fn superlattice(
         let index = inverse * Vector2::new(f64::from(h), f64::from(k));
         (index - index.map(f64::round)).amax() < 1e-6
     };
-    let straight = Phases::straight(coarse);
     let scene = scene.without_waves_beside(&coarse, &fine, &indices);
-    let normals = straight.normals(&scene, &indices);
+    let lattice = Phases::shown(&scene, coarse, bends);
+    let normals = lattice.normals(&scene, &indices);
     let of = |kept: &dyn Fn(usize) -> bool| {
         let kept: Vec<usize> = (0..2 * indices.len()).filter(|i| kept(i / 2)).collect();
         gains(&normals, &kept)
@@ -198,8 +212,8 @@ pub(crate) fn superlattice(
         .copied()
         .filter(|i| !first.iter().any(|f| f == i || f.map(|x| -x) == *i))
         .collect();
-    let mut own = straight.clone();
-    let rest = straight.residual(
+    let mut own = lattice.clone();
+    let rest = lattice.residual(
         &scene,
         &indices
             .iter()
@@ -209,7 +223,8 @@ pub(crate) fn superlattice(
     )?;
     own.others = first
         .iter()
-        .map(|index| strongest_near(&scene, &rest, wave(*index)))
+        .map(|[h, k]| lattice.pair * Vector2::new(f64::from(*h), f64::from(*k)))
+        .map(|q| strongest_near(&scene, &lattice, &rest, q))
         .collect();
     let normals = own.normals(&scene, &others);
     let all: Vec<usize> = (0..2 * (others.len() + first.len())).collect();
@@ -222,31 +237,4 @@ pub(crate) fn superlattice(
     } else {
         Superlattice::NotShown(predicts)
     })
-}
-
-/// The wave vector (rad per bin) with the most power near a given one.
-fn strongest_near(scene: &Scene, values: &[f64], q: Vector2<f64>) -> Vector2<f64> {
-    let step = scene.half.map(|half| TAU / (2.0 * half)) * (REACH / 5.0);
-    let rows = values.len() / scene.columns;
-    let power = |q: &Vector2<f64>| {
-        let (mut re, mut im) = (0.0, 0.0);
-        let (turn_re, turn_im) = (q.x.cos(), q.x.sin());
-        for row in 0..rows {
-            let start = q.y * (row as f64 - scene.middle.y) - q.x * scene.middle.x;
-            let (mut c, mut s) = (start.cos(), start.sin());
-            for value in &values[row * scene.columns..(row + 1) * scene.columns] {
-                re += value * c;
-                im += value * s;
-                (c, s) = (c * turn_re - s * turn_im, s * turn_re + c * turn_im);
-            }
-        }
-        re * re + im * im
-    };
-    let grid =
-        (-5..=5).flat_map(|i| (-5..=5).map(move |j| Vector2::new(f64::from(i), f64::from(j))));
-    let near = grid.map(|at| q + at.component_mul(&step));
-    let best = near
-        .map(|q| (power(&q), q))
-        .max_by(|a, b| a.0.total_cmp(&b.0));
-    best.map_or(q, |(_, q)| q)
 }

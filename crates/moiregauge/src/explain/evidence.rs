@@ -9,9 +9,6 @@ use crate::frame::image::Image;
 use crate::numbers::spread::mean_and_spread;
 use crate::spectrum::shells::{FIRST_SHELL, shells};
 
-/// Coefficients of cubic phases beyond a plane.
-pub(crate) const CUBIC: usize = 7;
-
 /// By how much more of the variance one description predicts than another, block by block.
 #[derive(Clone, Debug)]
 pub(crate) struct Blocks(Vec<f64>);
@@ -54,12 +51,7 @@ fn of_image(image: &Image, pair: &Matrix2<f64>, bends: bool) -> Option<f64> {
     let all: Vec<usize> = (0..2 * indices.len()).collect();
     let straight = Phases::straight(pair * scene.binning as f64);
     let scene = scene.without_waves_beside(&straight.pair, &straight.pair, indices);
-    let bent = || straight.clone().fitted(&scene, indices, CUBIC);
-    let phases = if bends { bent() } else { None };
-    let normals = phases
-        .as_ref()
-        .unwrap_or(&straight)
-        .normals(&scene, indices);
+    let normals = Phases::shown(&scene, straight.pair, bends).normals(&scene, indices);
     let gain = gains(&normals, &all)?;
     FIRST_SHELL
         .into_iter()
@@ -71,12 +63,12 @@ fn of_image(image: &Image, pair: &Matrix2<f64>, bends: bool) -> Option<f64> {
         })
 }
 
-/// Fraction of the variance (without slow background) that a lattice predicts.
-pub(crate) fn gain(image: &Image, pair: &Matrix2<f64>) -> Option<f64> {
+/// Fraction of the variance (without slow background) that a lattice predicts; `bends`: its phases may be cubic polynomials.
+pub(crate) fn gain(image: &Image, pair: &Matrix2<f64>, bends: bool) -> Option<f64> {
     let scene = Scene::new(image, pair, pair)?;
     let indices = shells(3);
     let all: Vec<usize> = (0..2 * indices.len()).collect();
-    let phases = Phases::straight(pair * scene.binning as f64);
+    let phases = Phases::shown(&scene, pair * scene.binning as f64, bends);
     let gain = gains(&phases.normals(&scene, indices), &all)?;
     Some(gain.iter().sum::<f64>() / scene.values.iter().map(|v| v * v).sum::<f64>())
 }

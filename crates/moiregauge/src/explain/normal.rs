@@ -5,6 +5,10 @@ use rustfft::num_complex::Complex64;
 
 use crate::explain::scene::{FOLDS, Scene};
 use crate::numbers::widest::widest;
+use crate::spectrum::shells::shells;
+
+/// Coefficients of cubic phases beyond a plane.
+pub(crate) const CUBIC: usize = 7;
 
 /// Damping of amplitudes, relative to each diagonal element of the normal equations: separates harmonics that a few blocks cannot.
 const RIDGE: f64 = 1e-3;
@@ -24,7 +28,7 @@ pub(crate) struct Phases {
     pub(crate) pair: Matrix2<f64>,
     /// Coefficients of [`terms`] of both phases, rad.
     pub(crate) bend: Vec<[f64; 2]>,
-    /// Wave vectors of non-lattice waves, rad per bin: they follow the harmonics.
+    /// Wave vectors of non-lattice waves, rad per bin: they follow the harmonics, and bend as these do.
     pub(crate) others: Vec<Vector2<f64>>,
 }
 
@@ -58,6 +62,51 @@ impl Phases {
         }
     }
 
+    /// Those of a lattice (reciprocal pair, rad per bin) in an image; `bends`: they may be cubic polynomials.
+    pub(crate) fn shown(scene: &Scene, pair: Matrix2<f64>, bends: bool) -> Self {
+        let fitted = || Self::straight(pair).fitted(scene, shells(3), CUBIC);
+        let bent = if bends { fitted() } else { None };
+        bent.unwrap_or_else(|| Self::straight(pair))
+    }
+
+    /// How far the bends move a place, in bins: a straight lattice has the same phases there. `unit`: the place, from −1 to 1.
+    pub(crate) fn displacement(&self, unit: Vector2<f64>) -> Vector2<f64> {
+        let mut bend = Vector2::zeros();
+        for (term, c) in terms(unit.x, unit.y, self.bend.len()).zip(&self.bend) {
+            bend += Vector2::from(*c) * term;
+        }
+        let inverse = self.pair.transpose().try_inverse();
+        inverse.map_or(bend, |inverse| inverse * bend)
+    }
+
+    /// Values of a wave (rad per bin) with the phases that it would have if the lattice were straight.
+    pub(crate) fn unbent(&self, scene: &Scene, values: &[f64], q: Vector2<f64>) -> Vec<Complex64> {
+        let turn = |i| Complex64::cis(-q.dot(&self.displacement(scene.unit(i))));
+        let each = values.iter().enumerate();
+        match self.bend.len() {
+            0 => values.iter().copied().map(Complex64::from).collect(),
+            _ => each.map(|(i, value)| value * turn(i)).collect(),
+        }
+    }
+
+    /// Values at the nearest bins of where they would be if the lattice were straight: to see its peaks, not to measure them.
+    pub(crate) fn straightened(&self, scene: &Scene, values: &[f64]) -> Vec<f64> {
+        if self.bend.is_empty() {
+            return values.to_vec();
+        }
+        let (columns, rows) = (scene.columns, values.len() / scene.columns);
+        let mut straight = vec![0.0; values.len()];
+        for (i, value) in values.iter().enumerate() {
+            let place = Vector2::new((i % columns) as f64, (i / columns) as f64);
+            let moved = (place + self.displacement(scene.unit(i))).map(f64::round);
+            let inside = |at: f64, count: usize| (0.0..count as f64).contains(&at);
+            if inside(moved.x, columns) && inside(moved.y, rows) {
+                straight[moved.y as usize * columns + moved.x as usize] = *value;
+            }
+        }
+        straight
+    }
+
     /// Calls `each(bin, block, place, waves)` with the values of `exp(i φ_h)` of the harmonics at every bin that is there.
     fn for_each(
         &self,
@@ -75,13 +124,13 @@ impl Phases {
         let mut powers = vec![[Complex64::default(); 2]; 2 * most as usize + 1];
         for (i, block) in scene.block.iter().enumerate() {
             let Some(block) = *block else { continue };
-            let at =
-                Vector2::new((i % scene.columns) as f64, (i / scene.columns) as f64) - scene.middle;
-            let unit = at.component_div(&scene.half);
-            let mut phases = self.pair.transpose() * at;
-            for (term, c) in terms(unit.x, unit.y, self.bend.len()).zip(&self.bend) {
-                phases += Vector2::from(*c) * term;
-            }
+            let unit = scene.unit(i);
+            let at = unit.component_mul(&scene.half);
+            let at = match self.bend.len() {
+                0 => at,
+                _ => at + self.displacement(unit),
+            };
+            let phases = self.pair.transpose() * at;
             for j in (0..2).filter(|_| most > 0) {
                 let first = Complex64::cis(phases[j]);
                 powers[most as usize][j] = Complex64::new(1.0, 0.0);
@@ -97,7 +146,7 @@ impl Phases {
             for (wave, q) in waves[indices.len()..].iter_mut().zip(&self.others) {
                 *wave = Complex64::cis(q.dot(&at));
             }
-            each(i, block, unit, &waves);
+            each(i, usize::from(block), unit, &waves);
         }
     }
 
@@ -207,6 +256,18 @@ impl Phases {
                     .sum::<f64>();
         });
         Some((weights, rest))
+    }
+
+    /// Amplitude of each wave.
+    pub(crate) fn amplitudes(normals: &[Normal]) -> Option<Vec<f64>> {
+        let weights = amplitudes(&total(normals), RIDGE)?;
+        Some(
+            weights
+                .as_slice()
+                .chunks_exact(2)
+                .map(|w| w[0].hypot(w[1]))
+                .collect(),
+        )
     }
 
     /// Values less the fitted waves; 0 where a bin is missing.

@@ -2,8 +2,8 @@
 
 use nalgebra::{Matrix2, Vector2};
 
-use crate::explain::evidence::{Blocks, CUBIC};
-use crate::explain::normal::{Phases, gains};
+use crate::explain::evidence::Blocks;
+use crate::explain::normal::{CUBIC, Phases, gains};
 use crate::explain::scene::Scene;
 use crate::frame::image::Image;
 use crate::spectrum::shells::shells;

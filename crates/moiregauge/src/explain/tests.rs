@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Matrix2, Vector2};
 
+use crate::explain::beside::wave_beside;
 use crate::explain::cells::{BETTER, Supercell, Superlattice, better_cell, superlattice};
 use crate::explain::evidence::{gain, weakest};
 use crate::explain::scene::gaussian_mean;
@@ -37,13 +38,13 @@ fn the_gain_is_the_fraction_of_the_variance() {
     for seed in 0..4 {
         let weakest = |image: &Image, bends| weakest(image, &pair(), bends).unwrap();
         let noisy = image(seed, 1.0, |at| lattice(&pair(), at));
-        let found = gain(&noisy, &pair()).unwrap();
+        let found = gain(&noisy, &pair(), false).unwrap();
         assert!((found - 0.6).abs() < 0.02, "{found}");
         assert!(weakest(&noisy, false) > 15.0 && weakest(&noisy, true) > 15.0);
         let stripes = image(seed, 0.5, |at| pair().column(0).dot(&at).cos());
         assert!(weakest(&stripes, false) < 3.0);
         let noise = image(seed, 1.0, |_| 0.0);
-        assert!(weakest(&noise, false) < 3.0 && gain(&noise, &pair()).unwrap() < 0.01);
+        assert!(weakest(&noise, false) < 3.0 && gain(&noise, &pair(), false).unwrap() < 0.01);
     }
 }
 
@@ -92,10 +93,12 @@ fn every_other_row_belongs_to_the_lattice() {
     for rows in 0..3 {
         let fine = Supercell::Rows(rows).fine(&pair());
         let value = |at: Vector2<f64>| lattice(&pair(), at) + 1.5 * lattice(&fine, at);
-        let found = better_cell(&image(1, 0.5, value), &fine).better.unwrap();
+        let found = better_cell(&image(1, 0.5, value), &fine, false)
+            .better
+            .unwrap();
         assert!((found - pair()).amax() < 1e-12, "{rows}: {found}");
         let alone = image(1, 0.5, |at| lattice(&fine, at));
-        assert_eq!(better_cell(&alone, &fine).better, None, "{rows}");
+        assert_eq!(better_cell(&alone, &fine, false).better, None, "{rows}");
     }
 }
 
@@ -105,7 +108,9 @@ fn half_order_rows_are_no_cell() {
     for rows in 0..3 {
         let coarse = Supercell::Rows(rows).coarse(&pair()).unwrap();
         let value = |at: Vector2<f64>| lattice(&pair(), at) + 0.7 * lattice(&coarse, at);
-        let found = better_cell(&image(3, 0.3, value), &coarse).better.unwrap();
+        let found = better_cell(&image(3, 0.3, value), &coarse, false)
+            .better
+            .unwrap();
         let names = pair().try_inverse().unwrap() * found;
         assert!(
             (names - names.map(f64::round)).amax() < 1e-9,
@@ -124,7 +129,7 @@ fn waves_that_are_missing_belong_to_no_lattice() {
     let alone = image(2, 0.5, |at| lattice(&pair(), at));
     for rows in 0..3 {
         let coarse = Supercell::Rows(rows).coarse(&pair()).unwrap();
-        let found = better_cell(&alone, &coarse).better.unwrap();
+        let found = better_cell(&alone, &coarse, false).better.unwrap();
         assert!((found - pair()).amax() < 1e-12, "{rows}: {found}");
     }
 }
@@ -136,7 +141,7 @@ fn waves_in_one_direction_refute_a_first_shell() {
     for seed in 0..12 {
         let stripes = |at: Vector2<f64>| 0.4 * coarse.column(0).dot(&at).cos();
         let striped = image(seed, 0.5, |at| lattice(&pair(), at) + stripes(at));
-        let said = superlattice(&striped, &coarse, Supercell::Root3);
+        let said = superlattice(&striped, &coarse, Supercell::Root3, false);
         assert_ne!(said, Some(Superlattice::Shown), "{seed}");
     }
 }
@@ -157,25 +162,33 @@ fn superlattices_are_told_from_foreign_peaks() {
             };
             let nested = with(coarse);
             assert_eq!(
-                better_cell(&nested, &pair()).better,
+                better_cell(&nested, &pair(), false).better,
                 Some(coarse),
                 "{cell:?}"
             );
-            assert_eq!(better_cell(&nested, &coarse).better, None, "{cell:?}");
+            assert_eq!(
+                better_cell(&nested, &coarse, false).better,
+                None,
+                "{cell:?}"
+            );
             let foreign = with(coarse + off);
-            let said = superlattice(&foreign, &coarse, cell);
+            let said = superlattice(&foreign, &coarse, cell, false);
             assert!(
                 matches!(said, Some(Superlattice::NotShown(by)) if by <= BETTER),
                 "{cell:?}"
             );
-            assert_eq!(better_cell(&foreign, &pair()).better, None, "{cell:?}");
             assert_eq!(
-                better_cell(&foreign, &coarse).better,
+                better_cell(&foreign, &pair(), false).better,
+                None,
+                "{cell:?}"
+            );
+            assert_eq!(
+                better_cell(&foreign, &coarse, false).better,
                 Some(cell.fine(&coarse)),
                 "{cell:?}"
             );
             let alone = image(seed, 0.5, |at| lattice(&pair(), at));
-            let said = superlattice(&alone, &coarse, cell);
+            let said = superlattice(&alone, &coarse, cell, false);
             assert!(
                 matches!(said, Some(Superlattice::NotShown(by)) if by <= BETTER),
                 "{cell:?}"
@@ -195,7 +208,7 @@ fn stripes_beside_a_lattice_drown_no_first_shell() {
         let value = |at: Vector2<f64>| lattice(&pair(), at) + 0.15 * lattice(&coarse, at);
         let striped = image(seed, 0.3, |at| value(at) + beside(at));
         let plain = image(seed, 0.3, value);
-        let said = superlattice(&striped, &coarse, Supercell::Root3);
+        let said = superlattice(&striped, &coarse, Supercell::Root3, false);
         assert_eq!(said, Some(Superlattice::Shown), "{seed}");
         let [with, without] = [&striped, &plain].map(|i| weakest(i, &coarse, false).unwrap());
         assert!(
@@ -203,11 +216,65 @@ fn stripes_beside_a_lattice_drown_no_first_shell() {
             "{seed}: {with} {without}"
         );
         let none = image(seed, 0.3, |at| lattice(&pair(), at) + beside(at));
-        let said = superlattice(&none, &coarse, Supercell::Root3);
+        let said = superlattice(&none, &coarse, Supercell::Root3, false);
         assert!(
             matches!(said, Some(Superlattice::NotShown(by)) if by < BETTER),
             "{seed}"
         );
+    }
+}
+
+/// A place under a scanner that bends by some pixels.
+fn bent(at: Vector2<f64>) -> Vector2<f64> {
+    let (u, v) = (
+        2.0 * at.x / SIZE[0] as f64 - 1.0,
+        2.0 * at.y / SIZE[1] as f64 - 1.0,
+    );
+    at + Vector2::new(3.0 * u * u - 2.0 * u * v, 2.5 * v * v + u * u * v)
+}
+
+/// A wave beside a lattice is found with its amplitude, straight or bent with it; of a lattice alone nothing is left.
+#[test]
+fn a_wave_beside_a_lattice_is_told_with_its_strength() {
+    let wave = Vector2::new(0.33, 0.41);
+    for (seed, bends) in [(0, false), (1, false), (2, true), (3, true)] {
+        let place = |at| if bends { bent(at) } else { at };
+        let with = |strength: f64| {
+            image(seed, 0.4, |at| {
+                lattice(&pair(), place(at)) + strength * wave.dot(&place(at)).cos()
+            })
+        };
+        for strength in [0.3, 1.2] {
+            let found = wave_beside(&with(strength), &pair(), bends).unwrap();
+            // Slow ground is taken off: 1 − exp(−(0.45 · 2π / 0.67 · 0.53)²/2) = 0.92 of this wave is left, all of the lattice.
+            let expected = 0.92 * strength;
+            assert!(
+                (found.strength - expected).abs() < 0.08 * strength,
+                "{found:?}"
+            );
+            let off = (found.wave_vector - wave)
+                .norm()
+                .min((found.wave_vector + wave).norm());
+            assert!(off < 0.4 * TAU / SIZE[1] as f64, "{found:?}");
+        }
+        assert_eq!(wave_beside(&with(0.0), &pair(), bends), None, "{seed}");
+    }
+}
+
+/// A superlattice is told from its sublattice under a scanner that bends, too.
+#[test]
+fn a_bent_superlattice_is_found() {
+    for cell in [Supercell::Root3, Supercell::Double] {
+        let coarse = cell.coarse(&pair()).unwrap();
+        let value = |at| lattice(&pair(), bent(at)) + 0.6 * lattice(&coarse, bent(at));
+        let both = image(1, 0.4, value);
+        assert_eq!(
+            better_cell(&both, &pair(), true).better,
+            Some(coarse),
+            "{cell:?}"
+        );
+        let alone = image(1, 0.4, |at| lattice(&pair(), bent(at)));
+        assert_eq!(better_cell(&alone, &pair(), true).better, None, "{cell:?}");
     }
 }
 

@@ -4,15 +4,16 @@ use std::sync::Arc;
 
 use heterostrain::lattice::shortest_pair;
 
+use crate::explain::beside::wave_beside;
 use crate::frame::background::Background;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::lattice::fit::few::FewWaves;
 use crate::lattice::fit::fitted::LatticeFit;
 use crate::lattice::ground::{WAYS, below};
-use crate::lattice::measure::{beside, measure_clipped, measure_levelled, no_lattice};
+use crate::lattice::measure::{measure_clipped, measure_levelled, no_lattice};
 use crate::lattice::measured::MeasuredLattice;
-use crate::lattice::predicted::{LEAST, best_predicted, judged};
+use crate::lattice::predicted::{LEAST, bends, best_predicted, judged};
 use crate::lattice::start::Start;
 use crate::spectrum::error::LatticeError;
 use crate::spectrum::method::Method;
@@ -85,54 +86,30 @@ fn measure_beside(
     background: Background,
 ) -> Result<MeasuredLattice, LatticeError> {
     let found = measure_levelled(image, geometry, background, Method::Lattice);
-    if !is_doubtful(&found) {
-        return found;
-    }
-    let Some(waves) = FewWaves::of(image) else {
-        return found;
+    // Stripes may have made a lattice, or hidden one.
+    let is_doubtful = |found: &MeasuredLattice| {
+        found.patch.is_some()
+            || found.fit.as_ref().is_none_or(LatticeFit::disagrees)
+            || wave_beside(image, &found.reciprocal, bends(found)).is_some()
     };
-    // A lattice that covers the frame and whose waves are all there is right, if it does not seem to change: perfect waves do not.
-    let plain = |fit: &LatticeFit| !fit.disagrees() && fit.change().is_none();
-    let whole = found.as_ref().ok().filter(|found| found.patch.is_none());
-    let plain = whole.filter(|found| found.fit.as_ref().is_some_and(plain));
-    if plain.is_some_and(|found| waves.are_of(&found.reciprocal)) {
-        return found;
+    match found {
+        Ok(found) if !is_doubtful(&found) => Ok(found),
+        other => beside_stripes(image, geometry, background).map_or(other, Ok),
     }
-    beside_stripes(&waves, image, geometry, background).map_or(found, Ok)
-}
-
-/// Whether stripes may have made a lattice, or hidden one.
-fn is_doubtful(found: &Result<MeasuredLattice, LatticeError>) -> bool {
-    let Ok(found) = found else {
-        return true;
-    };
-    found.patch.is_some()
-        || beside(found).is_some()
-        || found.fit.as_ref().is_none_or(LatticeFit::disagrees)
 }
 
 /// The lattice of an image of a few perfect waves, some of which are not harmonics of the lattice.
 fn beside_stripes(
-    waves: &FewWaves,
     image: &Image,
     geometry: &Geometry,
     background: Background,
 ) -> Option<MeasuredLattice> {
-    let method = Method::Lattice;
+    let waves = FewWaves::of(image)?;
     let pair = waves.pair()?;
     let to_physical = geometry.pixel_to_nm.try_inverse()?.transpose();
     let pair = pair * shortest_pair(&(to_physical * pair))?;
-    let (rest, wave) = waves.taken_off(image, &pair)?;
+    let rest = waves.taken_off(image, &pair)?;
     let start = Start::at(&rest, geometry, background, &pair)?;
-    let mut found = start.measure(method).ok()?;
-    if no_lattice(&found).is_some() {
-        return None;
-    }
-    if let Some(fit) = &mut found.fit {
-        let told = fit.foreign_wave.map_or(0.0, |told| told.significance);
-        if wave.significance > told {
-            fit.foreign_wave = Some(wave);
-        }
-    }
-    Some(found)
+    let found = start.measure(Method::Lattice).ok()?;
+    no_lattice(&found).is_none().then_some(found)
 }

@@ -10,7 +10,6 @@ use crate::frame::background::Background;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::lattice::fit::fitted::{FittedHarmonic, LatticeFit};
-use crate::lattice::fit::noise::ForeignWave;
 use crate::lattice::measured::MeasuredLattice;
 use crate::lattice::predicted::of_better_cell;
 use crate::lattice::start::Start;
@@ -120,15 +119,6 @@ pub(crate) fn measure_whole(
     method: Method,
 ) -> Result<MeasuredLattice, LatticeError> {
     Start::find(image, geometry, background)?.measure(method)
-}
-
-/// A wave that stands out beside the lattice.
-pub(crate) fn beside(found: &MeasuredLattice) -> Option<ForeignWave> {
-    found
-        .fit
-        .as_ref()?
-        .foreign_wave
-        .filter(ForeignWave::is_significant)
 }
 
 /// The lattice of the whole frame or, where it does not cover it, of the part that it covers. The background is off already.

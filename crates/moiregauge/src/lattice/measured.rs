@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::coverage::bend::Change;
 use crate::coverage::patch::LatticeRegion;
+use crate::explain::beside::WaveBeside;
 use crate::explain::cells::{BETTER, MOST};
 use crate::explain::table::Row;
 use crate::lattice::common::Common;
@@ -118,6 +119,9 @@ pub struct Evidence {
     /// The lattices that were compared: this one, then the others, those that predict most first.
     #[serde(default)]
     pub candidates: Vec<Candidate>,
+    /// The wave that the lattice does not explain and that predicts best, if it is not chance.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub beside: Option<WaveBeside>,
 }
 
 /// A lattice that an image may show.

@@ -18,9 +18,10 @@ pub(crate) mod predicted;
 pub(crate) mod several;
 pub(crate) mod start;
 
+pub use crate::explain::beside::WaveBeside;
 pub use common::Common;
 pub use find::measure;
-pub use fit::{Closure, FittedHarmonic, ForeignWave, Inhomogeneity, LatticeFit};
+pub use fit::{Closure, FittedHarmonic, Inhomogeneity, LatticeFit};
 pub use measured::{Atoms, Candidate, Evidence, MeasuredLattice};
 pub use paper::PublishedPeaks;
 pub use several::measure_several;

@@ -3,6 +3,7 @@
 use heterostrain::lattice::distortion;
 use nalgebra::Matrix2;
 
+use crate::explain::beside::wave_beside;
 use crate::explain::cells::{BETTER, better_cell};
 use crate::explain::evidence::{gain, proposed, weakest};
 use crate::explain::table::{Row, table};
@@ -43,7 +44,11 @@ pub(crate) fn of_better_cell(
     method: Method,
 ) -> MeasuredLattice {
     let part = found.patch.as_ref().map(|patch| patch.of(image));
-    let nested = better_cell(part.as_ref().unwrap_or(image), &found.reciprocal);
+    let nested = better_cell(
+        part.as_ref().unwrap_or(image),
+        &found.reciprocal,
+        bends(&found),
+    );
     let measured = || {
         let part = found.patch.as_ref();
         let other = measure_pair(&nested.better?, part, image, geometry, background, method)?;
@@ -130,7 +135,7 @@ pub(crate) fn with_evidence(
     // Waves near the points of a larger cell that may be its own.
     let doubtful = found.larger_cell.filter(|(_, better)| *better > BETTER);
     let doubtful = doubtful.map(|(pair, better)| Row {
-        share: gain(part, &pair).unwrap_or(0.0),
+        share: gain(part, &pair, bends).unwrap_or(0.0),
         cells: 1,
         pair,
         behind: -better,
@@ -141,6 +146,7 @@ pub(crate) fn with_evidence(
         rivals,
         larger: found.larger_cell.map_or(0.0, |(_, better)| better),
         candidates: candidates.chain(doubtful).collect(),
+        beside: wave_beside(part, &found.reciprocal, bends),
     });
     (found, better)
 }

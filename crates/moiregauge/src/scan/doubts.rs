@@ -6,13 +6,12 @@ use crate::caveat::Caveat;
 use crate::caveat::lattices::{LatticeDoubt, LineDifference, OtherGrain};
 use crate::caveat::positions::PositionDoubt;
 use crate::coverage::bend::{Change, ChangeModel};
+use crate::explain::beside::WaveBeside;
 use crate::frame::geometry::Geometry;
 use crate::lattice::fit::bend::Inhomogeneity;
 use crate::lattice::fit::closure::Closure;
 use crate::lattice::fit::fitted::LatticeFit;
-use crate::lattice::fit::noise::ForeignWave;
 use crate::lattice::measured::{Grain, MeasuredLattice};
-use crate::lattice::predicted::bends;
 use crate::numbers::chi2;
 use crate::numbers::three::three;
 use crate::scan::measured::MeasuredLine;
@@ -104,9 +103,11 @@ pub(crate) fn about_coverage(
             caveats.push(Caveat::new(LatticeDoubt::Rivals { rivals }, file));
         }
         let disagrees = lattice.fit.as_ref().is_some_and(LatticeFit::disagrees);
-        let other = evidence.undecided().filter(|_| !bends(lattice));
+        let other = evidence.undecided();
         let part = evidence.part_of_cell().filter(|_| disagrees);
+        let beside = evidence.beside.as_ref();
         let doubts = [
+            beside.and_then(|wave| second_lattice(wave, geometry)),
             other.map(|[whole, other]| LatticeDoubt::OtherLattice { whole, other }),
             part.map(|[whole, part]| LatticeDoubt::PartOfCell { whole, part }),
         ];
@@ -148,6 +149,16 @@ pub(crate) fn about_coverage(
     }
 }
 
+/// The caveat of a wave that a lattice does not explain.
+fn second_lattice(wave: &WaveBeside, geometry: &Geometry) -> Option<LatticeDoubt> {
+    let inverse = geometry.pixel_to_nm.try_inverse()?;
+    Some(LatticeDoubt::SecondLattice {
+        period: std::f64::consts::TAU / (inverse.transpose() * wave.wave_vector).norm(),
+        strength: wave.strength,
+        predicts: wave.predicts,
+    })
+}
+
 /// Length of a boundary that is told in sides of cells, nm: right for a straight line, a tenth too short for a circle.
 fn boundary(grain: &Grain, geometry: &Geometry) -> f64 {
     let [along, across] = grain.boundary;
@@ -173,13 +184,8 @@ fn other_grain(
     })
 }
 
-/// What the fit to the pixels found beside the lattice.
-pub(crate) fn about_fit(
-    file: &str,
-    fit: &LatticeFit,
-    geometry: &Geometry,
-    caveats: &mut Vec<Caveat>,
-) {
+/// How well the fit to the pixels describes the image.
+pub(crate) fn about_fit(file: &str, fit: &LatticeFit, caveats: &mut Vec<Caveat>) {
     if let Some(change) = fit.inhomogeneity.filter(Inhomogeneity::is_significant) {
         caveats.push(Caveat::new(
             LatticeDoubt::Inhomogeneous {
@@ -201,19 +207,4 @@ pub(crate) fn about_fit(
             file,
         ));
     }
-    let Some(wave) = fit.foreign_wave.filter(ForeignWave::is_significant) else {
-        return;
-    };
-    let Some(inverse) = geometry.pixel_to_nm.try_inverse() else {
-        return;
-    };
-    let period = std::f64::consts::TAU / (inverse.transpose() * wave.wave_vector).norm();
-    caveats.push(Caveat::new(
-        LatticeDoubt::SecondLattice {
-            period,
-            significance: wave.significance,
-            threshold: wave.threshold,
-        },
-        file,
-    ));
 }

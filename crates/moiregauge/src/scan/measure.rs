@@ -389,7 +389,7 @@ pub(crate) fn about_lattice(
     few_periods(file, lattice, caveats);
     about_coverage(file, lattice, geometry, caveats);
     if let Some(fit) = &lattice.fit {
-        about_fit(file, fit, geometry, caveats);
+        about_fit(file, fit, caveats);
     }
 }
 

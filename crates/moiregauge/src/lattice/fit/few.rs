@@ -13,7 +13,7 @@ use nalgebra::{Matrix2, Vector2};
 use crate::frame::image::Image;
 use crate::lattice::fit::frame::Frame;
 use crate::lattice::fit::joint::Joint;
-use crate::lattice::fit::noise::{BESIDE, ForeignWave, ResidualNoise};
+use crate::lattice::fit::noise::{BESIDE, ResidualNoise};
 use crate::numbers::three::three;
 
 /// Fewest cycles of a wave in the frame: slower ones are background.
@@ -91,17 +91,6 @@ impl FewWaves {
         })
     }
 
-    /// Whether a lattice (rad per pixel) is that of three of them that add up, or one of which these are a higher shell, and the others are not harmonics of
-    /// its harmonics.
-    pub(crate) fn are_of(&self, reciprocal: &Matrix2<f64>) -> bool {
-        let Some(pair) = self.pair() else {
-            return false;
-        };
-        let is_on = |q: &Vector2<f64>| self.is_harmonic(q, reciprocal);
-        let mut others = self.waves.iter().filter(|q| !self.is_harmonic(q, &pair));
-        pair.column_iter().all(|q| is_on(&q.into_owned())) && !others.any(is_on)
-    }
-
     /// Whether a wave is a harmonic of a lattice (both rad per pixel).
     fn is_harmonic(&self, q: &Vector2<f64>, pair: &Matrix2<f64>) -> bool {
         pair.try_inverse().is_some_and(|inverse| {
@@ -140,12 +129,8 @@ impl FewWaves {
         open.then(|| Matrix2::from_columns(&[a, -b * sign]))
     }
 
-    /// The image without the waves that are not harmonics of a lattice (rad per pixel), and the strongest of these; `None` where there is none.
-    pub(crate) fn taken_off(
-        &self,
-        image: &Image,
-        pair: &Matrix2<f64>,
-    ) -> Option<(Image, ForeignWave)> {
+    /// The image without the waves that are not harmonics of a lattice (rad per pixel); `None` where there is none.
+    pub(crate) fn taken_off(&self, image: &Image, pair: &Matrix2<f64>) -> Option<Image> {
         let beside: Vec<usize> = (0..self.waves.len())
             .filter(|&i| !self.is_harmonic(&self.waves[i], pair))
             .collect();
@@ -161,22 +146,10 @@ impl FewWaves {
             return None;
         }
         let mut rest = image.clone();
-        let mut strongest: Option<ForeignWave> = None;
         for i in beside {
             model.take_off(&frame, i, &mut rest.values);
-            let [a, b] = model.amplitudes[i];
-            // A wave of amplitude A has A²N/4 under the window's 4/9 in its highest bin.
-            let power = (a * a + b * b) * frame.pixels() as f64 / 9.0;
-            let significance = power / seen.level_near(model.waves[i] / PI);
-            if strongest.is_none_or(|s| s.significance < significance) {
-                strongest = Some(ForeignWave {
-                    wave_vector: self.waves[i],
-                    significance,
-                    threshold: seen.threshold(),
-                });
-            }
         }
-        Some((rest, strongest?))
+        Some(rest)
     }
 
     /// Whether nothing is left but noise and higher harmonics, compared with the weakest of the first waves of a lattice: holes and edges leave skirts
@@ -376,18 +349,7 @@ mod tests {
                 "{seed}: {names}"
             );
             assert!((names - whole).amax() < 0.01, "{seed}: {names}");
-            assert!(waves.are_of(&pair()));
-            // A lattice that has these waves as a higher shell, and one that has the stripes as well.
-            let finer = pair() * Matrix2::new(1.0, 1.0, -1.0, 2.0).try_inverse().unwrap();
-            assert!(waves.are_of(&finer));
-            let with_stripes = Matrix2::from_columns(&[pair().column(0).into_owned(), q]);
-            assert!(!waves.are_of(&with_stripes));
-            let (rest, told) = waves.taken_off(&striped, &found).unwrap();
-            let off = told.wave_vector;
-            assert!(
-                (off - q).norm().min((off + q).norm()) < 1e-3,
-                "{seed}: {off}"
-            );
+            let rest = waves.taken_off(&striped, &found).unwrap();
             let bare = image(seed, lattice);
             let left = rest
                 .values

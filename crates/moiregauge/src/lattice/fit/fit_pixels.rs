@@ -18,7 +18,7 @@ use crate::lattice::fit::gram::gram;
 use crate::lattice::fit::leverage::Leverage;
 use crate::lattice::fit::lines::LineStatistics;
 use crate::lattice::fit::model::{Clip, LineOffsets, Model, look, settled};
-use crate::lattice::fit::noise::{ForeignWave, ResidualNoise};
+use crate::lattice::fit::noise::ResidualNoise;
 use crate::lattice::fit::places::{InPlaces, Places};
 use crate::lattice::fit::tables::Tables;
 use crate::lattice::fit::{bend, closure, frame, solve};
@@ -366,11 +366,7 @@ impl<'a> Fit<'a> {
             .collect()
     }
 
-    pub(crate) fn result(
-        &self,
-        noise: &FinalNoise,
-        foreign_wave: Option<ForeignWave>,
-    ) -> Option<(Lattice<Px>, LatticeFit)> {
+    pub(crate) fn result(&self, noise: &FinalNoise) -> Option<(Lattice<Px>, LatticeFit)> {
         let scale = self.frame.edge().map(|e| 1.0 / e);
         let harmonics = self.harmonics(noise);
         let strengths: Vec<f64> = harmonics.iter().map(|h| h.signal_to_noise).collect();
@@ -418,7 +414,6 @@ impl<'a> Fit<'a> {
             line_offsets: self.line_sigma,
             lines_left_out: self.frame.image.rows - self.frame.lines(),
             clipped,
-            foreign_wave,
             residual: noise.places.left.clone(),
             inhomogeneity,
             closure,

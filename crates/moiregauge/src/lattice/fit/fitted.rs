@@ -8,7 +8,6 @@ use crate::lattice::fit::bend::Inhomogeneity;
 use crate::lattice::fit::closure::Closure;
 use crate::lattice::fit::frame;
 use crate::lattice::fit::left::LeftOver;
-use crate::lattice::fit::noise::ForeignWave;
 use crate::numbers::exact;
 use crate::numbers::three::three;
 use crate::spectrum::phases::Phases;
@@ -43,8 +42,6 @@ pub struct LatticeFit {
     /// Share of the pixels whose residuals are cut off; 0.3 % for Gaussian noise.
     #[serde(with = "exact")]
     pub clipped: f64,
-    /// The strongest wave that is left and none of the lattice's: a second lattice, or pick-up.
-    pub foreign_wave: Option<ForeignWave>,
     /// The transform of what is left, across the lines from each of the first three harmonics: two images tell by it what noise they
     /// share.
     #[serde(default)]
@@ -116,9 +113,6 @@ impl LatticeFit {
             let q = frame::wave(&self.wave_vectors.basis, harmonic.index);
             // The mean over a bin lowers the amplitude, and so it does the noise in a cell.
             harmonic.amplitude /= mean_over_bin(q.x, size) * mean_over_bin(q.y, size);
-        }
-        if let Some(foreign) = &mut self.foreign_wave {
-            foreign.wave_vector /= size;
         }
         if let Some(change) = &mut self.inhomogeneity {
             change.mean /= size;

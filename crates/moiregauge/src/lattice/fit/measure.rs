@@ -38,7 +38,6 @@ pub(crate) fn measure(
     }
     let noise = fit.choose()?;
     let noise = without_bend(&fit, noise);
-    let foreign = noise.residual.foreign_wave(&fit.frame, &fit.model);
-    let (lattice, fit) = fit.result(&noise, foreign)?;
+    let (lattice, fit) = fit.result(&noise)?;
     Some(Found { lattice, fit })
 }

@@ -49,4 +49,3 @@ pub(crate) mod tables;
 pub use bend::Inhomogeneity;
 pub use closure::Closure;
 pub use fitted::{FittedHarmonic, LatticeFit};
-pub use noise::ForeignWave;

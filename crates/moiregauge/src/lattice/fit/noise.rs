@@ -1,4 +1,4 @@
-//! Noise of the residual: its power around each harmonic, and the strongest non-lattice peak.
+//! Noise of the residual: its power around each harmonic.
 //!
 //! The residual is Hann-windowed and transformed. The fit removes power near each harmonic, and with few periods
 //! that is nearly everywhere. So the measured power is divided by the power that white noise of unit variance would leave in the same
@@ -9,13 +9,10 @@ use std::f64::consts::PI;
 use std::sync::OnceLock;
 
 use nalgebra::Vector2;
-use serde::{Deserialize, Serialize};
 
 use crate::lattice::fit::frame::Frame;
 use crate::lattice::fit::leverage::{ALONG, Leverage};
 use crate::lattice::fit::local::{Bin, acting_on};
-use crate::lattice::fit::model::Model;
-use crate::numbers::exact;
 use crate::numbers::median::median;
 use crate::spectrum::fourier::wide;
 use crate::spectrum::select::{BLOCK_WIDTH, NoiseMap};
@@ -29,14 +26,6 @@ const NEAR: i64 = 8;
 const BACKGROUND: i64 = 2;
 /// The first column of the spectrum without power of line offsets, which the window spreads over two columns.
 pub(super) const BESIDE: i64 = 2;
-/// Distance from a lattice point (cycles per frame) beyond which a peak is no harmonic: nearer, it may belong to an
-/// inhomogeneous lattice. Chosen by eye; see docs/constants.md.
-const FOREIGN: f64 = 3.0;
-/// Highest order for which [`FOREIGN`] holds.
-const LOW_ORDER: f64 = 4.0;
-/// The same distance at higher orders, where most lattice points have no peak: the main lobe of the window. Sharp domain walls
-/// make harmonics of any order.
-const HARMONIC: f64 = 2.0;
 
 /// The periodogram of a residual.
 pub(crate) struct ResidualNoise {
@@ -47,28 +36,6 @@ pub(crate) struct ResidualNoise {
     /// `Σ w²` of the window over the pixels that are used.
     window_power: f64,
     pub(super) free_lines: bool,
-}
-
-/// The strongest non-lattice peak of the residual.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[non_exhaustive]
-pub struct ForeignWave {
-    /// Its wave vector, rad per pixel.
-    #[serde(with = "exact")]
-    pub wave_vector: Vector2<f64>,
-    /// Its power over the noise power around it.
-    #[serde(with = "exact")]
-    pub significance: f64,
-    /// The significance that chance exceeds once in some ten thousand images of this size.
-    #[serde(with = "exact")]
-    pub threshold: f64,
-}
-
-impl ForeignWave {
-    /// True if noise alone does not explain the peak.
-    pub fn is_significant(&self) -> bool {
-        self.significance > self.threshold
-    }
 }
 
 impl ResidualNoise {
@@ -209,58 +176,6 @@ impl ResidualNoise {
     /// Noise power per pixel around a frequency (cycles per frame).
     pub(super) fn level_near(&self, k: Vector2<f64>) -> f64 {
         self.noise_near(k) / self.window_power
-    }
-
-    /// The strongest peak that is no harmonic, no background and no line offset.
-    pub(crate) fn foreign_wave(&self, frame: &Frame, model: &Model) -> Option<ForeignWave> {
-        let noise = self.blocks();
-        let rows = self.spectrum.rows;
-        let cycles = model.pair / PI;
-        let inverse = cycles.try_inverse()?;
-        let on = |k: Vector2<f64>| {
-            let index = (inverse * k).map(f64::round);
-            let near = if index.amax() <= LOW_ORDER {
-                FOREIGN
-            } else {
-                HARMONIC
-            };
-            (k - cycles * index).norm() < near
-        };
-        // Waves beyond the Nyquist frequency are aliased by one cycle per pixel.
-        let turn = Vector2::new(self.spectrum.columns as f64, rows as f64);
-        let ours = |k: Vector2<f64>| {
-            let turns = (-1..=1).flat_map(|x| (-1..=1).map(move |y| Vector2::new(x, y)));
-            turns
-                .map(|t| t.map(f64::from))
-                .any(|t| on(k + t.component_mul(&turn)))
-        };
-        let half = self.spectrum.half();
-        let (mut most, mut best) = (0.0, None);
-        for (y, line) in self.spectrum.values.chunks_exact(half).enumerate() {
-            let signed = if 2 * y <= rows {
-                y as f64
-            } else {
-                y as f64 - rows as f64
-            };
-            for (b, (block, noise)) in line.chunks(BLOCK_WIDTH).zip(noise.row(y)).enumerate() {
-                for (i, value) in block.iter().enumerate() {
-                    let power = wide(*value).norm_sqr();
-                    if power > most * noise && (b > 0 || i > 1) {
-                        let k = Vector2::new((b * BLOCK_WIDTH + i) as f64, signed);
-                        if !ours(k) {
-                            most = power / noise;
-                            best = Some(k);
-                        }
-                    }
-                }
-            }
-        }
-        let k = best?;
-        Some(ForeignWave {
-            wave_vector: (k * PI).component_div(&frame.edge()),
-            significance: most,
-            threshold: self.threshold(),
-        })
     }
 
     /// Power over noise that noise alone exceeds once in about ten thousand images of this size.
