@@ -114,13 +114,12 @@ fn a_first_shell_that_hides_is_found() {
     }
 }
 
-/// Rough ground hides the first waves of sharp walls, and a wave beside the lattice of half the cell tells. A lattice that changes around a hole, and by more than
-/// windows show of it in single images, gives its mean.
+/// Rough ground hides the first waves of sharp walls. A lattice that changes around a hole, and by more than windows show of it in single images, gives its mean.
 #[test]
 fn what_is_hard_to_see_is_right() {
     let cases = [
-        ("walls+terrain", "6", 0.004, "second-lattice"),
-        ("twist-wave+hole", "1", 0.002, "changing-lattice"),
+        ("walls+terrain", "6", 0.004, None),
+        ("twist-wave+hole", "1", 0.002, Some("changing-lattice")),
     ];
     for (sample, seed, most, word) in cases {
         let (_folder, [set, out]) = varied(sample, seed);
@@ -132,7 +131,10 @@ fn what_is_hard_to_see_is_right() {
             (value - wanted).abs() < 4.0 * sigma && sigma < most,
             "{sample}: {value} ± {sigma}, {wanted}"
         );
-        assert!(caveats(&found).contains(&word), "{sample}");
+        assert!(
+            word.is_none_or(|word| caveats(&found).contains(&word)),
+            "{sample}"
+        );
     }
 }
 

@@ -80,14 +80,16 @@ pub(crate) fn better_cell(image: &Image, pair: &Matrix2<f64>, bends: bool) -> Ne
     let rows = (0..3).map(Supercell::Rows).filter(|_| elongated);
     let all = all.into_iter().chain(rows);
     let mut larger: Option<(Matrix2<f64>, f64)> = None;
-    // Shown by straight waves or, where the lattice changes, by bent ones.
+    // Shown by straight waves or, where the lattice changes, by bent ones; if by neither, what predicts more.
     let shows = |coarse: &Matrix2<f64>, supercell| {
         let straight = superlattice(image, coarse, supercell, false);
         let bent = || superlattice(image, coarse, supercell, true);
-        if bends && straight != Some(Superlattice::Shown) {
-            bent()
-        } else {
-            straight
+        match straight {
+            Some(Superlattice::NotShown(by)) if bends => match bent() {
+                Some(Superlattice::NotShown(other)) => Some(Superlattice::NotShown(by.max(other))),
+                other => other,
+            },
+            straight => straight,
         }
     };
     let mut is_shown = |coarse: &Matrix2<f64>, said: Option<Superlattice>| match said {

@@ -94,7 +94,14 @@ fn measure_beside(
     };
     match found {
         Ok(found) if !is_doubtful(&found) => Ok(found),
-        other => beside_stripes(image, geometry, background).map_or(other, Ok),
+        before => match beside_stripes(image, geometry, background) {
+            // The waves that are taken off may be those of a larger cell.
+            Some(mut found) => {
+                found.larger_cell = before.ok().and_then(|before| before.larger_cell);
+                Ok(found)
+            }
+            None => before,
+        },
     }
 }
 

@@ -11,7 +11,8 @@ use crate::frame::geometry::Geometry;
 use crate::lattice::fit::bend::Inhomogeneity;
 use crate::lattice::fit::closure::Closure;
 use crate::lattice::fit::fitted::LatticeFit;
-use crate::lattice::measured::{Grain, MeasuredLattice};
+use crate::lattice::measured::{Candidate, Grain, MeasuredLattice};
+use crate::lattice::predicted::bends;
 use crate::numbers::chi2;
 use crate::numbers::three::three;
 use crate::scan::measured::MeasuredLine;
@@ -103,7 +104,9 @@ pub(crate) fn about_coverage(
             caveats.push(Caveat::new(LatticeDoubt::Rivals { rivals }, file));
         }
         let disagrees = lattice.fit.as_ref().is_some_and(LatticeFit::disagrees);
-        let other = evidence.undecided();
+        // Bent phases fit any lattice to a part of an image: what predicts less is no rival.
+        let is_rival = |[_, other]: &[Candidate; 2]| !bends(lattice) || other.behind < 0.0;
+        let other = evidence.undecided().filter(is_rival);
         let part = evidence.part_of_cell().filter(|_| disagrees);
         let beside = evidence.beside.as_ref();
         let doubts = [
