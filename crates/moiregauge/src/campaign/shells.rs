@@ -11,7 +11,7 @@ use crate::scan::measure::{about_lattice, share_noise};
 use crate::scan::measured::{MeasuredLine, MeasuredScan};
 
 /// Cells of a harmonic shell for each of the lattice: 3 (the second shell), 4 (the third), 2 (every other row).
-const CELLS: std::ops::RangeInclusive<i32> = 2..=4;
+const CELLS: [i32; 3] = [2, 3, 4];
 /// Lattices of trace and retrace agree to this share of a vector: creep and lag are smaller. Half and twice as much
 /// change no result of docs/constants.md.
 const AGREE: f64 = 0.1;
@@ -65,10 +65,13 @@ fn outvoted(scans: &[MeasuredScan]) -> Vec<Vec<bool>> {
             .flat_map(|scan| &scan.lines)
     };
     let is_shell = |line: &MeasuredLine| {
-        let larger = all().filter(|other| times(other, line).is_some()).count();
         let alike = || all().filter(|other| cells(other, line) == Some(1));
-        let outvoted = || larger >= OUTVOTED * alike().count() || together(alike()) > BETTER;
-        larger > 0 && outvoted()
+        CELLS.into_iter().any(|cells| {
+            let larger = all().filter(|other| times(other, line) == Some(cells));
+            let larger = larger.count();
+            let outvoted = larger >= OUTVOTED * alike().count();
+            larger > 0 && (outvoted || together(alike(), cells) > BETTER)
+        })
     };
     let of_scan = |scan: &MeasuredScan| {
         let each = scan.lines.iter();
@@ -77,10 +80,14 @@ fn outvoted(scans: &[MeasuredScan]) -> Vec<Vec<bool>> {
     scans.iter().map(of_scan).collect()
 }
 
-/// By how many standard errors lattices of which theirs are harmonic shells predict better, in several images together.
-fn together<'a>(lines: impl Iterator<Item = &'a MeasuredLine>) -> f64 {
+/// By how many standard errors lattices with `cells` of their cells in one predict better, in several images together.
+fn together<'a>(lines: impl Iterator<Item = &'a MeasuredLine>, cells: i32) -> f64 {
     let evidence = lines.filter_map(|line| line.lattice.evidence.as_ref());
-    let all: Vec<f64> = evidence.map(|evidence| evidence.larger).collect();
+    let of = CELLS
+        .iter()
+        .position(|other| *other == cells)
+        .unwrap_or_default();
+    let all: Vec<f64> = evidence.map(|evidence| evidence.larger[of]).collect();
     all.iter().sum::<f64>() / (all.len().max(1) as f64).sqrt()
 }
 

@@ -53,6 +53,11 @@ impl Supercell {
         }
     }
 
+    /// How many of the smaller cells the larger one holds.
+    fn cells(self) -> usize {
+        self.names().determinant().round() as usize
+    }
+
     /// Reciprocal pair of the larger cell, from that of the smaller.
     pub(crate) fn coarse(self, fine: &Matrix2<f64>) -> Option<Matrix2<f64>> {
         Some(fine * self.names().try_inverse()?)
@@ -64,13 +69,22 @@ impl Supercell {
     }
 }
 
+/// A lattice with a larger cell that an image does not clearly show.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Larger {
+    /// Reciprocal pair, rad per pixel.
+    pub(crate) pair: Matrix2<f64>,
+    /// By how many standard errors it predicts better.
+    pub(crate) predicts: f64,
+}
+
 /// A lattice beside those whose cells are several times or a part of its own.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Nested {
     /// Reciprocal pair (rad per pixel) of one that predicts the image better.
     pub(crate) better: Option<Matrix2<f64>>,
-    /// That of the larger cell, not taken, that predicts better by most standard errors, and how many.
-    pub(crate) larger: Option<(Matrix2<f64>, f64)>,
+    /// Lattices with 2, 3 and 4 of its cells in one that were not taken.
+    pub(crate) larger: [Option<Larger>; 3],
 }
 
 /// Compares the lattice of `pair` (reciprocal, rad per pixel) with those of larger and smaller cells. `bends`: phases may be cubic polynomials.
@@ -79,36 +93,35 @@ pub(crate) fn better_cell(image: &Image, pair: &Matrix2<f64>, bends: bool) -> Ne
     let elongated = is_elongated(pair);
     let rows = (0..3).map(Supercell::Rows).filter(|_| elongated);
     let all = all.into_iter().chain(rows);
-    let mut larger: Option<(Matrix2<f64>, f64)> = None;
-    // Shown by straight waves or, where the lattice changes, by bent ones; if by neither, what predicts more.
+    // Shown by straight waves or, where the lattice changes, by bent ones.
     let shows = |coarse: &Matrix2<f64>, supercell| {
         let straight = superlattice(image, coarse, supercell, false);
         let bent = || superlattice(image, coarse, supercell, true);
-        match straight {
-            Some(Superlattice::NotShown(by)) if bends => match bent() {
-                Some(Superlattice::NotShown(other)) => Some(Superlattice::NotShown(by.max(other))),
-                other => other,
-            },
-            straight => straight,
+        if bends && straight != Some(Superlattice::Shown) {
+            bent()
+        } else {
+            straight
         }
-    };
-    let mut is_shown = |coarse: &Matrix2<f64>, said: Option<Superlattice>| match said {
-        Some(Superlattice::NotShown(by)) => {
-            if by > larger.map_or(0.0, |(_, most)| most) {
-                larger = Some((*coarse, by));
-            }
-            false
-        }
-        said => said == Some(Superlattice::Shown),
     };
     let coarse = all.clone();
     let coarse = coarse.filter_map(|supercell| Some((supercell, supercell.coarse(pair)?)));
     let coarse: Vec<(Supercell, Matrix2<f64>)> = coarse.collect();
     let said = coarse.par_iter();
     let said = said.map(|(supercell, coarse)| shows(coarse, *supercell));
-    let mut said = coarse.iter().zip(said.collect::<Vec<_>>());
-    let shown = said.find(|((_, coarse), said)| is_shown(coarse, *said));
-    let shown = shown.map(|(shown, _)| *shown);
+    let said: Vec<Option<Superlattice>> = said.collect();
+    let mut larger = [None; 3];
+    let mut is_shown = |supercell: Supercell, pair: Matrix2<f64>, said: Option<Superlattice>| {
+        if let Some(Superlattice::NotShown(predicts)) = said {
+            let most: &mut Option<Larger> = &mut larger[supercell.cells() - 2];
+            if most.is_none_or(|most| most.predicts < predicts) {
+                *most = Some(Larger { pair, predicts });
+            }
+        }
+        said == Some(Superlattice::Shown)
+    };
+    let mut said = coarse.into_iter().zip(said);
+    let shown = said.find(|((supercell, pair), said)| is_shown(*supercell, *pair, *said));
+    let shown = shown.map(|(shown, _)| shown);
     let own = OnceCell::new();
     let better = shown.or_else(|| {
         let mut fine = all.map(|supercell| (supercell, supercell.fine(pair)));
@@ -117,7 +130,7 @@ pub(crate) fn better_cell(image: &Image, pair: &Matrix2<f64>, bends: bool) -> Ne
             let is_regular = elongated && !is_elongated(fine);
             let share = *own.get_or_init(|| gain(image, pair, bends));
             predicts_as_well(image, fine, share, bends) == Some(true)
-                && (is_regular || !is_shown(pair, shows(pair, *supercell)))
+                && (is_regular || !is_shown(*supercell, *pair, shows(pair, *supercell)))
         })
     });
     let better = better.map(|(_, pair)| pair);
@@ -200,7 +213,7 @@ pub(crate) fn superlattice(
     };
     let predicts = errors(&large, &small);
     if predicts < BETTER {
-        return Some(Superlattice::NotShown(predicts.max(0.0)));
+        return Some(Superlattice::NotShown(predicts));
     }
     let first: Vec<[i32; 2]> = FIRST_SHELL.into_iter().filter(|i| !is_fine(*i)).collect();
     let adds: Option<Vec<f64>> = first.iter().map(adds).collect();

@@ -9,6 +9,9 @@ use crate::frame::image::Image;
 use crate::numbers::spread::mean_and_spread;
 use crate::spectrum::shells::{FIRST_SHELL, shells};
 
+/// What rounding makes of the difference of two equal descriptions, as a fraction of the variance, and far less than noise does.
+const ROUNDING: f64 = 1e-9;
+
 /// By how much more of the variance one description predicts than another, block by block.
 #[derive(Clone, Debug)]
 pub(crate) struct Blocks(Vec<f64>);
@@ -29,7 +32,7 @@ impl Blocks {
     /// The mean over its standard error.
     pub(crate) fn standard_errors(&self) -> f64 {
         let spread = mean_and_spread(&self.0);
-        spread.value / (spread.sigma / (self.0.len() as f64).sqrt()).max(f64::MIN_POSITIVE)
+        spread.value / (spread.sigma / (self.0.len() as f64).sqrt()).max(ROUNDING)
     }
 }
 

@@ -146,7 +146,7 @@ impl Phases {
             for (wave, q) in waves[indices.len()..].iter_mut().zip(&self.others) {
                 *wave = Complex64::cis(q.dot(&at));
             }
-            each(i, usize::from(block), unit, &waves);
+            each(i, block, unit, &waves);
         }
     }
 

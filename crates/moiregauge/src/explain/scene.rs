@@ -36,7 +36,7 @@ pub(crate) struct Scene {
     /// Values in bins; 0 where a bin is missing.
     pub(crate) values: Vec<f64>,
     /// Block of each bin; `None` where the bin is missing.
-    pub(crate) block: Vec<Option<u8>>,
+    pub(crate) block: Vec<Option<usize>>,
     /// Pixels of a bin along each axis.
     pub(crate) binning: usize,
     /// Middle of the bins that are there (column, row), and half of their extent.
@@ -56,18 +56,6 @@ impl Scene {
         } else {
             image.clone()
         };
-        let (scene, picked) = Self::in_blocks(&binned, binning)?;
-        let longest = TAU / norms(coarse).into_iter().fold(f64::INFINITY, f64::min);
-        let sigma = BACKGROUND * longest / binning as f64;
-        let background = gaussian_mean(&binned.values, scene.columns, sigma, &picked);
-        let without = |i: usize| scene.block[i].map_or(0.0, |_| binned.values[i] - background[i]);
-        let mut values: Vec<f64> = (0..binned.values.len()).map(without).collect();
-        clip(&mut values);
-        Some(Self { values, ..scene })
-    }
-
-    /// The bins of an image in blocks, without values, and which lines are looked at.
-    fn in_blocks(binned: &Image, binning: usize) -> Option<(Self, Vec<bool>)> {
         let [columns, rows] = [binned.columns, binned.rows];
         let there = |i: &usize| binned.values[*i].is_finite();
         let place = |i: usize| Vector2::new((i % columns) as f64, (i / columns) as f64);
@@ -92,18 +80,23 @@ impl Scene {
         }
         let block = |i: usize| {
             let at = (place(i) - low).component_div(&extent) * BLOCKS as f64;
-            (there(&i) && picked[i / columns])
-                .then(|| (at.y as usize * BLOCKS + at.x as usize) as u8)
+            (there(&i) && picked[i / columns]).then(|| at.y as usize * BLOCKS + at.x as usize)
         };
-        let scene = Self {
+        let longest = TAU / norms(coarse).into_iter().fold(f64::INFINITY, f64::min);
+        let sigma = BACKGROUND * longest / binning as f64;
+        let background = gaussian_mean(&binned.values, columns, sigma, &picked);
+        let block: Vec<Option<usize>> = (0..binned.values.len()).map(block).collect();
+        let without = |i: usize| block[i].map_or(0.0, |_| binned.values[i] - background[i]);
+        let mut values: Vec<f64> = (0..binned.values.len()).map(without).collect();
+        clip(&mut values);
+        Some(Self {
             columns,
-            block: (0..binned.values.len()).map(block).collect(),
-            values: Vec::new(),
+            block,
+            values,
             binning,
             middle: (low + high) / 2.0,
             half: extent / 2.0,
-        };
-        Some((scene, picked))
+        })
     }
 
     /// The place of a bin, from −1 to 1 along each axis.
@@ -128,7 +121,7 @@ impl Scene {
         self.block
             .iter()
             .flatten()
-            .for_each(|block| counts[usize::from(*block)] += 1);
+            .for_each(|block| counts[*block] += 1);
         let most = counts.iter().max().copied().unwrap_or(0);
         counts.iter().map(|count| FULL * *count > most).collect()
     }

@@ -6,8 +6,8 @@ use nalgebra::{Matrix2, Vector2};
 
 use crate::explain::beside::wave_beside;
 use crate::explain::cells::{BETTER, Supercell, Superlattice, better_cell, superlattice};
-use crate::explain::evidence::{gain, weakest};
-use crate::explain::scene::gaussian_mean;
+use crate::explain::evidence::{Blocks, gain, weakest};
+use crate::explain::scene::{Scene, gaussian_mean};
 use crate::explain::table::table;
 use crate::frame::image::Image;
 use crate::numbers::rng::normals;
@@ -100,6 +100,18 @@ fn every_other_row_belongs_to_the_lattice() {
         let alone = image(1, 0.5, |at| lattice(&fine, at));
         assert_eq!(better_cell(&alone, &fine, false).better, None, "{rows}");
     }
+}
+
+/// Two descriptions that differ by rounding alone are as good, however small the scatter of their difference.
+#[test]
+fn rounding_decides_nothing() {
+    let bins = image(1, 0.5, |at| lattice(&pair(), at));
+    let scene = Scene::new(&bins, &pair(), &pair()).unwrap();
+    let one: Vec<f64> = (0..Scene::blocks())
+        .map(|block| 3.0 + block as f64)
+        .collect();
+    let other: Vec<f64> = one.iter().map(|gain| gain * (1.0 - f64::EPSILON)).collect();
+    assert!(Blocks::difference(&scene, &one, &other).standard_errors() < 1e-3);
 }
 
 /// Half-order waves in one direction make a superlattice of a lattice that is nearly hexagonal: its cell is measured.

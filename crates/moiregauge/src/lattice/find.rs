@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use heterostrain::lattice::shortest_pair;
 
-use crate::explain::beside::wave_beside;
+use crate::explain::beside::{WaveBeside, wave_beside};
 use crate::frame::background::Background;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
@@ -86,18 +86,19 @@ fn measure_beside(
     background: Background,
 ) -> Result<MeasuredLattice, LatticeError> {
     let found = measure_levelled(image, geometry, background, Method::Lattice);
-    // Stripes may have made a lattice, or hidden one.
+    // Stripes as strong as the waves of a lattice may have made it, or hidden one.
+    let is_strong = |wave: WaveBeside| wave.strength >= 1.0;
     let is_doubtful = |found: &MeasuredLattice| {
         found.patch.is_some()
             || found.fit.as_ref().is_none_or(LatticeFit::disagrees)
-            || wave_beside(image, &found.reciprocal, bends(found)).is_some()
+            || wave_beside(image, &found.reciprocal, bends(found)).is_some_and(is_strong)
     };
     match found {
         Ok(found) if !is_doubtful(&found) => Ok(found),
         before => match beside_stripes(image, geometry, background) {
             // The waves that are taken off may be those of a larger cell.
             Some(mut found) => {
-                found.larger_cell = before.ok().and_then(|before| before.larger_cell);
+                found.larger = before.map_or([None; 3], |before| before.larger);
                 Ok(found)
             }
             None => before,

@@ -97,7 +97,7 @@ fn on_even_ground(
         }
         again.ground = Some(side as f64);
         again.evidence.clone_from(&before.evidence);
-        again.larger_cell = before.larger_cell;
+        again.larger = before.larger;
         found = again;
     }
     Some(found)

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::coverage::bend::Change;
 use crate::coverage::patch::LatticeRegion;
 use crate::explain::beside::WaveBeside;
-use crate::explain::cells::{BETTER, MOST};
+use crate::explain::cells::{BETTER, Larger, MOST};
 use crate::explain::table::Row;
 use crate::lattice::common::Common;
 use crate::lattice::fit::fitted::LatticeFit;
@@ -67,9 +67,9 @@ pub struct MeasuredLattice {
     /// The lattices of those that could be measured, until the scan is put together.
     #[serde(skip)]
     pub(crate) beside: Vec<MeasuredLattice>,
-    /// Reciprocal pair (rad per pixel) of a larger cell that its waves may have, and by how many standard errors that predicts better.
+    /// Lattices with 2, 3 and 4 of its cells in one that the image may show.
     #[serde(skip)]
-    pub(crate) larger_cell: Option<(Matrix2<f64>, f64)>,
+    pub(crate) larger: [Option<Larger>; 3],
     /// What the other estimator found: autocorrelation beside Fourier, Fourier beside all others.
     #[serde(with = "exact")]
     pub comparison: Option<Lattice<Px>>,
@@ -113,9 +113,9 @@ pub struct Evidence {
     pub predicts: Option<f64>,
     /// How many waves of about its period beside it are as strong as its weakest one.
     pub rivals: usize,
-    /// By how many standard errors a lattice predicts better of which it is a harmonic shell and that was not taken.
+    /// By how many standard errors lattices with 2, 3 and 4 of its cells in one predict better, which were not taken.
     #[serde(with = "exact")]
-    pub larger: f64,
+    pub larger: [f64; 3],
     /// The lattices that were compared: this one, then the others, those that predict most first.
     #[serde(default)]
     pub candidates: Vec<Candidate>,

@@ -55,7 +55,7 @@ pub(crate) fn of_better_cell(
         no_lattice(&other).is_none().then_some(other)
     };
     let mut better = measured().unwrap_or(found);
-    better.larger_cell = nested.larger;
+    better.larger = nested.larger;
     better
 }
 
@@ -132,19 +132,20 @@ pub(crate) fn with_evidence(
     };
     let better = rows.iter().find(is_better).map(|row| row.pair);
     let candidates = rows.iter().map(|row| Candidate::new(row, &to_physical));
-    // Waves near the points of a larger cell that may be its own.
-    let doubtful = found.larger_cell.filter(|(_, better)| *better > BETTER);
-    let doubtful = doubtful.map(|(pair, better)| Row {
-        share: gain(part, &pair, bends).unwrap_or(0.0),
+    // Waves near the points of larger cells that may be their own.
+    let larger = found.larger.into_iter().flatten();
+    let doubtful = larger.filter(|larger| larger.predicts > BETTER);
+    let doubtful = doubtful.map(|larger| Row {
+        share: gain(part, &larger.pair, bends).unwrap_or(0.0),
         cells: 1,
-        pair,
-        behind: -better,
+        pair: larger.pair,
+        behind: -larger.predicts,
     });
     let doubtful = doubtful.map(|row| Candidate::new(&row, &to_physical));
     found.evidence = Some(Evidence {
         predicts: weakest(part, &found.reciprocal, bends),
         rivals,
-        larger: found.larger_cell.map_or(0.0, |(_, better)| better),
+        larger: found.larger.map(|l| l.map_or(0.0, |l| l.predicts)),
         candidates: candidates.chain(doubtful).collect(),
         beside: wave_beside(part, &found.reciprocal, bends),
     });
