@@ -123,14 +123,10 @@ pub enum OrientationDoubt {
     },
     /// Atoms beside the moiré that may be of either layer.
     #[error(
-        "twist and strain may be wrong by a fraction as large as the strain between the layers: within the calibration \
-         of the scanner, the atoms beside the moiré may also be those of layer {layer}. Say which layer's atoms the \
-         image shows"
+        "the atoms beside the moiré were not used, since within the calibration of the scanner they may be those of either \
+         layer. Say which layer's atoms the image shows"
     )]
-    RulerLayer {
-        /// The layer that was not taken.
-        layer: u8,
-    },
+    RulerLayer,
 }
 
 /// Twist and mean strain for one sense of the twist.
@@ -192,9 +188,9 @@ explain! { OrientationDoubt:
         "No twist of the sense that was given fits the orientation of the layer. The other sense is shown."
         "Check the sense of the twist, and whether the orientation belongs to this layer."
     RulerLayer "ruler-layer-open" Warning
-        "The atoms beside the moiré may be those of either layer. The likelier one was taken: the upper layer, unless their size says \
-         the other one."
-        "Say which layer's atoms the image shows."
+        "The atoms beside the moiré may be those of either layer: the scanner may be off by as much as their constants differ. The \
+         twist that is reported is by the scanner, without the atoms."
+        "Say which layer's atoms the image shows, or calibrate the scanner."
     RulerMoire "ruler-moire-open" Note
         "The image shows several moirés and the atoms of one layer. The atoms measure those moirés that this layer makes, and the image does \
          not tell which these are."

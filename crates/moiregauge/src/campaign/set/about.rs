@@ -29,13 +29,9 @@ pub(crate) fn about_set(
     let of_several = settings.moires > 1 && settings.ruler == RulerLayer::Auto;
     if ruler.is_some() && of_several {
         caveats.push(Caveat::new(OrientationDoubt::RulerMoire, &set.name));
-    } else if let Some(layer) = ruler.and_then(|ruler| ruler.other_layer) {
-        caveats.push(Caveat::new(
-            OrientationDoubt::RulerLayer { layer },
-            &set.name,
-        ));
-    }
-    if let Some(ruler) = ruler.filter(|ruler| ruler.others().next().is_some())
+    } else if ruler.is_some_and(|ruler| ruler.other_layer.is_some()) {
+        caveats.push(Caveat::new(OrientationDoubt::RulerLayer, &set.name));
+    } else if let Some(ruler) = ruler.filter(|ruler| ruler.others().next().is_some())
         && let Some(tensor) = &ruler.mean.readings.tensor
     {
         let readings = std::iter::once(tensor.in_all()).chain(ruler.others());
