@@ -206,7 +206,13 @@ fn info(file: &NetCdf<'_>, image: &Variable) -> ChannelInfo {
 /// Attributes, single numbers and texts, without the place where the file once was.
 fn metadata(file: &NetCdf<'_>) -> Vec<(String, String)> {
     let told = file.attributes.iter().cloned();
-    let of_variable = |variable: &Variable| Some((variable.name.clone(), file.words(variable)?));
+    // Variables of a damaged file overlap: their texts together are no longer than the file.
+    let mut left = file.bytes.len();
+    let of_variable = |variable: &Variable| {
+        let text = file.words(variable).filter(|text| text.len() <= left)?;
+        left -= text.len();
+        Some((variable.name.clone(), text))
+    };
     let variables = file
         .variables
         .iter()

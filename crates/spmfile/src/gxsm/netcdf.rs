@@ -18,7 +18,7 @@ const MOST_DIMENSIONS: usize = 1024;
 
 /// A file by its header.
 pub(super) struct NetCdf<'a> {
-    bytes: &'a [u8],
+    pub(super) bytes: &'a [u8],
     pub(super) attributes: Vec<(String, String)>,
     pub(super) variables: Vec<Variable>,
 }

@@ -92,3 +92,25 @@ fn what_is_cut_off_is_lost() {
     let other = crate::read(b"CDF\x01\0\0\0\0\0\0\0\x0a").expect_err("no scan");
     assert!(other.to_string().contains("NetCDF"));
 }
+
+/// A damaged file of 300 texts that lie on top of each other does not take 300 times its memory.
+#[test]
+fn texts_are_no_longer_than_the_file() {
+    const TEXT: usize = 4000;
+    let mut bytes = b"CDF\x01".to_vec();
+    let mut put = |words: &[u32]| bytes.extend(words.iter().flat_map(|word| word.to_be_bytes()));
+    let name = u32::from_be_bytes(*b"n\0\0\0");
+    // No records; one dimension; no attributes; variables of kind 2 (text).
+    put(&[0, 10, 1, 1, name, TEXT as u32, 0, 0, 11, 300]);
+    let header = 4 * (1 + 10 + 300 * 9);
+    for _ in 0..300 {
+        put(&[1, name, 1, 0, 0, 0, 2, TEXT as u32, header as u32]);
+    }
+    assert_eq!(bytes.len(), header);
+    bytes.extend([b'x'; TEXT]);
+    let file = NetCdf::of(&bytes).expect("whole");
+    assert_eq!(file.variables.len(), 300);
+    let texts = metadata(&file);
+    let long: usize = texts.iter().map(|(_, text)| text.len()).sum();
+    assert!(!texts.is_empty() && long <= bytes.len(), "{long}");
+}
