@@ -127,6 +127,18 @@ pub enum OrientationDoubt {
          layer. Say which layer's atoms the image shows"
     )]
     RulerLayer,
+    /// The size of the atoms contradicts the calibration of the scanner.
+    #[error(
+        "the atoms beside the moiré {} used: for them to be those of the layer, the scanner has to be off by {:+.1} % along the fast axis, which its \
+         calibration excludes. They may be another lattice",
+        if *.used { "were" } else { "were not" }, 100.0 * .gain
+    )]
+    RulerSize {
+        /// By which share the scanner shows lengths along the fast axis too large.
+        gain: f64,
+        /// Whether the user said that they are.
+        used: bool,
+    },
 }
 
 /// Twist and mean strain for one sense of the twist.
@@ -191,6 +203,10 @@ explain! { OrientationDoubt:
         "The atoms beside the moiré may be those of either layer: the scanner may be off by as much as their constants differ. The \
          twist that is reported is by the scanner, without the atoms."
         "Say which layer's atoms the image shows, or calibrate the scanner."
+    RulerSize "ruler-contradicts" Serious
+        "The lattice beside the moiré has about the size of a layer's atoms, and the calibration of the scanner excludes that it is theirs. It \
+         may be a reconstruction or a harmonic. It is used only if the user said that it is the layer."
+        "Calibrate the scanner, or give a larger error of its gain (`calibration.gain_percent`) if it may be off by as much."
     RulerMoire "ruler-moire-open" Note
         "The image shows several moirés and the atoms of one layer. The atoms measure those moirés that this layer makes, and the image does \
          not tell which these are."

@@ -413,3 +413,27 @@ fn one_ruler_measures_two_moires() {
         assert!(codes.any(|code| code == "ruler-moire-open"));
     }
 }
+
+/// What is 8.5 % smaller than the atoms of the layer is no ruler for a scanner that is known to 1 %, unless the user says that it is the layer, or that the
+/// scanner may be off by as much.
+#[test]
+fn the_calibration_excludes_a_ruler() {
+    let scan = frame(&scanner(0.915), 0.5, 4);
+    let used = |ruler, gain_percent| {
+        let mut settings = Settings {
+            drift_draws: 0,
+            strain_draws: 0,
+            ruler,
+            ..Settings::default()
+        };
+        settings.calibration.gain_percent = gain_percent;
+        let measured = measure_scan("scan", &scan, &settings, None).unwrap();
+        let found = analyse(vec![measured], &settings);
+        let doubts = found.caveats.iter();
+        let excluded = doubts.filter(|caveat| caveat.code() == "ruler-contradicts");
+        (found.sets[0].ruler.as_ref().unwrap().used, excluded.count())
+    };
+    assert_eq!(used(RulerLayer::Auto, 1.0), (false, 1));
+    assert_eq!(used(RulerLayer::Second, 1.0), (true, 1));
+    assert_eq!(used(RulerLayer::Auto, 3.0), (true, 0));
+}

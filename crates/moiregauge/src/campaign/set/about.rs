@@ -3,6 +3,7 @@
 use crate::campaign::analysis::{ScanAnalysis, SetAnalysis, SetMean};
 use crate::campaign::set::mean::counted;
 use crate::campaign::set::moire;
+use crate::campaign::set::ruler::is_contradicted;
 use crate::caveat::Caveat;
 use crate::caveat::moires::MoireDoubt;
 use crate::caveat::orientation::{OrientationDoubt, SenseNumbers};
@@ -37,6 +38,13 @@ pub(crate) fn about_set(
         let readings = std::iter::once(tensor.in_all()).chain(ruler.others());
         let doubt = OrientationDoubt::RulerReadings {
             readings: readings.map(SenseNumbers::from).collect(),
+        };
+        caveats.push(Caveat::new(doubt, &set.name));
+    }
+    if let Some(ruler) = ruler.filter(|ruler| is_contradicted(ruler, settings)) {
+        let doubt = OrientationDoubt::RulerSize {
+            gain: ruler.fast_gain.value - 1.0,
+            used: ruler.used,
         };
         caveats.push(Caveat::new(doubt, &set.name));
     }

@@ -11,7 +11,7 @@ use crate::campaign::set::common::common;
 use crate::campaign::set::drift::{constant_drift, outruns, unknown};
 use crate::campaign::set::mean::{at_drift, forward_backward, without_drift};
 use crate::campaign::set::moire::{breaks, draw};
-use crate::campaign::set::ruler::{ruled, tell};
+use crate::campaign::set::ruler::{is_contradicted, ruled, tell};
 use crate::campaign::set::scan::scans_at_drift;
 use crate::campaign::set::{joint, published};
 use crate::campaign::shells::of_other_shell;
@@ -136,13 +136,14 @@ pub(crate) fn analyse_set(
     set
 }
 
-/// Whether the set is measured by its ruler: where its reading is decided and the user says so, or the layer is decided as well and the
-/// total uncertainty of the twist is smaller. Which of several moirés have the layer whose atoms show is not decided.
+/// Whether the set is measured by its ruler: where its reading is decided and the user says so, or the layer is decided as well, the scanner does not
+/// contradict it, and the total uncertainty of the twist is smaller. Which of several moirés have the layer whose atoms show is not decided.
 fn is_better(ruler: &Ruled, mean: Option<&SetMean>, settings: &Settings) -> bool {
     let total = |mean: &SetMean| mean.twist().total;
     let smaller = |mean: &SetMean| !(total(mean) <= total(&ruler.mean));
     let told = settings.ruler != RulerLayer::Auto;
     let decided = settings.moires < 2 && ruler.other_layer.is_none();
+    let decided = decided && !is_contradicted(ruler, settings);
     let layer = told || (decided && mean.is_none_or(smaller));
     layer && ruler.others().next().is_none()
 }

@@ -24,8 +24,8 @@ use crate::settings::knobs::{RulerLayer, Settings};
 /// The upper layer is the ruler unless the size of the atoms says the other one by odds of ten to one more: `2 ln 10`.
 const ODDS: f64 = 4.6;
 
-/// The other layer is excluded if the χ² of its size is larger by this: as for lattices that cannot be one, since calibrations may be worse than
-/// they are said to be.
+/// A size of the atoms is excluded if its χ² by the calibration of the scanner is larger by this: as for lattices that cannot be one, since calibrations
+/// may be worse than they are said to be.
 const DECIDED: f64 = 50.0;
 
 /// The atoms of one line.
@@ -161,6 +161,17 @@ pub(crate) fn ruled(
     })
 }
 
+/// Whether the calibration of the scanner excludes that these atoms are those of the layer: they may be another lattice of about this size.
+pub(crate) fn is_contradicted(ruler: &Ruled, settings: &Settings) -> bool {
+    chi2(ruler.fast_gain.value - 1.0, settings) > DECIDED
+}
+
+/// χ² of a relative error of the scale, by the calibration of the scanner.
+fn chi2(off: f64, settings: &Settings) -> f64 {
+    let sigma = (settings.calibration.gain_percent / 100.0).max(1e-3);
+    (off / sigma).powi(2)
+}
+
 /// Tells the lines of a set that their atoms are its ruler.
 pub(crate) fn tell(scans: &mut [ScanAnalysis], ruled: &Ruled) {
     for scan in scans {
@@ -261,7 +272,6 @@ fn layer(atoms: &[Lattice], settings: &Settings) -> Option<(u8, Option<u8>)> {
         RulerLayer::Auto if !is_one(2) => return told(1),
         RulerLayer::Auto => {}
     }
-    // χ² of the size by the calibration of the scanner.
     let off = |layer: u8| {
         let free = materials[usize::from(layer) - 1]
             .atomic_pair()
@@ -269,8 +279,7 @@ fn layer(atoms: &[Lattice], settings: &Settings) -> Option<(u8, Option<u8>)> {
         let sizes = atoms
             .iter()
             .map(|atoms| (atoms.basis.determinant() / free).abs().sqrt() - 1.0);
-        let sigma = (settings.calibration.gain_percent / 100.0).max(1e-3);
-        (sizes.sum::<f64>() / atoms.len() as f64 / sigma).powi(2)
+        chi2(sizes.sum::<f64>() / atoms.len() as f64, settings)
     };
     let (layer, other) = if off(2) - off(1) < ODDS {
         (2, 1)
