@@ -159,7 +159,7 @@ def run(program, first, last, written, *rest):
 
 def table(*files):
     lines = [json.loads(line) for file in files for line in open(file)]
-    print("| kind | frames | by the atoms | by the scanner | no twist | median error (%) | largest (%) | median total (%) | rms error / total | sign of the mean strain | by the scanner: rms error / total | its readings by the atoms: the truth among them within 3 σ |")
+    print("| kind | frames | by the atoms | by the scanner | no twist | median error (%) | largest (%) | median total (%) | rms error / total | sign of the mean strain | by the scanner: rms error / total | truth among the readings (3 σ) |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
     for kind in dict.fromkeys(line["kind"] for line in lines):
         of, found, signs = [l for l in lines if l["kind"] == kind], {True: [], False: []}, []
@@ -184,10 +184,10 @@ def table(*files):
         rms = lambda some: f"{math.sqrt(numpy.mean([(e / t) ** 2 for e, t in some])):.2f}" if some else "–"
         by = found[True]
         e, t = numpy.array(by).T if by else (numpy.zeros(1), numpy.zeros(1))
-        numbers = f"{numpy.median(e):.3f} | {e.max():.3f} | {numpy.median(t):.3f} | {rms(by)} | {sum(signs)} of {len(signs)}" if by else "– | – | – | – | –"
+        numbers = f"{numpy.median(e):.3f} | {e.max():.3f} | {numpy.median(t):.3f} | {rms(by)} | {sum(signs)}/{len(signs)}" if by else "– | – | – | – | –"
         none = len(of) - len(by) - len(found[False])
         inside = sum(abs(off) < 3 for off, _ in listed)
-        among = f"{inside} of {len(listed)}" if listed else "–"
+        among = f"{inside}/{len(listed)}" if listed else "–"
         print(f"| {kind} | {len(of)} | {len(by)} | {len(found[False])} | {none} | {numbers} | {rms(found[False])} | {among} |")
 
 if __name__ == "__main__":
