@@ -66,11 +66,11 @@ fn outvoted(scans: &[MeasuredScan]) -> Vec<Vec<bool>> {
     };
     let is_shell = |line: &MeasuredLine| {
         let alike = || all().filter(|other| cells(other, line) == Some(1));
-        CELLS.into_iter().any(|cells| {
+        CELLS.into_iter().enumerate().any(|(place, cells)| {
             let larger = all().filter(|other| times(other, line) == Some(cells));
             let larger = larger.count();
             let outvoted = larger >= OUTVOTED * alike().count();
-            larger > 0 && (outvoted || together(alike(), cells) > BETTER)
+            larger > 0 && (outvoted || together(alike(), place) > BETTER)
         })
     };
     let of_scan = |scan: &MeasuredScan| {
@@ -80,14 +80,11 @@ fn outvoted(scans: &[MeasuredScan]) -> Vec<Vec<bool>> {
     scans.iter().map(of_scan).collect()
 }
 
-/// By how many standard errors lattices with `cells` of their cells in one predict better, in several images together.
-fn together<'a>(lines: impl Iterator<Item = &'a MeasuredLine>, cells: i32) -> f64 {
+/// By how many standard errors lattices with more of their cells in one predict better, in several images together. `place`: that of their number in
+/// [`CELLS`].
+fn together<'a>(lines: impl Iterator<Item = &'a MeasuredLine>, place: usize) -> f64 {
     let evidence = lines.filter_map(|line| line.lattice.evidence.as_ref());
-    let of = CELLS
-        .iter()
-        .position(|other| *other == cells)
-        .unwrap_or_default();
-    let all: Vec<f64> = evidence.map(|evidence| evidence.larger[of]).collect();
+    let all: Vec<f64> = evidence.map(|evidence| evidence.larger[place]).collect();
     all.iter().sum::<f64>() / (all.len().max(1) as f64).sqrt()
 }
 
