@@ -40,6 +40,7 @@ flags="-C target-feature=+simd128"
 flags+=" --remap-path-prefix=$root=. --remap-path-prefix=${CARGO_HOME:-$HOME/.cargo}=cargo"
 if [ ${#std[@]} -gt 0 ]; then
   flags+=" -C link-self-contained=no -L native=$libc -C linker=wasm-ld"
+  grep -q pthread_create "$libc/libc.a" || flags+=" --cfg no_threads_in_libc"
   # What this compiler knows, and counts as unfinished.
   std+=(--ignore-rust-version)
   export RUSTC_BOOTSTRAP=1 RUSTC_WRAPPER=$root/packaging/older.sh

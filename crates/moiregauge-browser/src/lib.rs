@@ -5,6 +5,9 @@
 //! dropped lies in `/dropped`, works are kept in `/kept`. Events are lines of JSON on the standard output.
 #![cfg(target_family = "wasm")]
 
+#[cfg(no_threads_in_libc)]
+mod threads;
+
 use std::cell::OnceCell;
 use std::collections::BTreeMap;
 use std::path::Path;
