@@ -127,7 +127,7 @@ fn a_grain_is_chosen_by_its_number() {
     ];
     let scans = simulate(
         place,
-        &[&["--pixels", "256", "--scans", "2"], &sample[..]].concat(),
+        &[&["--pixels", "128", "--scans", "2"], &sample[..]].concat(),
     );
     let found = |name: &str, options: &[&str]| {
         let out = place.join(name);

@@ -70,6 +70,11 @@ pub(crate) fn pitch(geometry: &Geometry) -> [f64; 2] {
 
 /// Whether two pairs are waves of the same lattice, in a frame of `size` (columns, rows).
 pub(crate) fn same(size: [usize; 2], a: &Matrix2<f64>, b: &Matrix2<f64>) -> bool {
+    cells(size, a, b) == Some(1.0)
+}
+
+/// How many cells of the lattice `b` one cell of the lattice `a` holds; `None` where waves of `b` are not waves of `a`.
+pub(crate) fn cells(size: [usize; 2], a: &Matrix2<f64>, b: &Matrix2<f64>) -> Option<f64> {
     let frame =
         Matrix2::from_diagonal(&Vector2::from(size.map(|n| n as f64))) / std::f64::consts::TAU;
     let short = |pair: &Matrix2<f64>| {
@@ -77,10 +82,6 @@ pub(crate) fn same(size: [usize; 2], a: &Matrix2<f64>, b: &Matrix2<f64>) -> bool
         shortest_pair(&pair).map_or(pair, |change| pair * change)
     };
     let (a, b) = (short(a), short(b));
-    let Some(inverse) = a.try_inverse() else {
-        return false;
-    };
-    let names = inverse * b;
-    let whole = names.map(f64::round);
-    whole.determinant().abs() == 1.0 && (b - a * whole).amax() < SAME
+    let whole = (a.try_inverse()? * b).map(f64::round);
+    ((b - a * whole).amax() < SAME).then(|| whole.determinant().abs())
 }

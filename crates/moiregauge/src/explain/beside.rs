@@ -107,20 +107,20 @@ impl Scene {
         strong: &Matrix2<f64>,
         indices: &[[i32; 2]],
     ) -> Self {
-        if let Some(taken) = self.waves_beside(pair, strong, indices) {
+        if let Some((_, taken)) = self.waves_beside(pair, Some(strong), indices) {
             let values = self.values.iter_mut().zip(taken);
             values.for_each(|(value, taken)| *value -= taken);
         }
         self
     }
 
-    /// The sum of the waves beside a lattice.
-    fn waves_beside(
+    /// The same waves, and their sum; `strong`: `None` for harmonics without skirts.
+    pub(crate) fn waves_beside(
         &self,
         pair: &Matrix2<f64>,
-        strong: &Matrix2<f64>,
+        strong: Option<&Matrix2<f64>>,
         indices: &[[i32; 2]],
-    ) -> Option<Vec<f64>> {
+    ) -> Option<(Phases, Vec<f64>)> {
         let wave = |[h, k]: &[i32; 2]| pair * Vector2::new(f64::from(*h), f64::from(*k));
         let all = self.powers(&self.values);
         let power_at = |q: Vector2<f64>| {
@@ -133,10 +133,11 @@ impl Scene {
         };
         let least = weakest(&FIRST_SHELL);
         let inverted = |pair: &Matrix2<f64>| (*pair, pair.try_inverse());
-        let (own, skirts) = (inverted(pair), inverted(strong));
+        let (own, skirts) = (inverted(pair), strong.map(inverted));
         let strongest = |powers: &[(Vector2<f64>, f64)]| {
             let is_other = |q: &Vector2<f64>| {
-                self.to_nearest(q, &own) > LOBE && self.to_nearest(q, &skirts) > SKIRT
+                let is_free = |skirts| self.to_nearest(q, skirts) > SKIRT;
+                self.to_nearest(q, &own) > LOBE && skirts.as_ref().is_none_or(is_free)
             };
             let stands_out = |(q, power): &&(Vector2<f64>, f64)| {
                 let around = powers
@@ -176,7 +177,7 @@ impl Scene {
             waves = fitted.unwrap_or(waves);
         }
         let taken = rest.values.iter().zip(&left).map(|(all, left)| all - left);
-        Some(taken.collect())
+        Some((waves, taken.collect()))
     }
 
     /// Distance of a wave vector from the nearest point of a lattice (reciprocal pair, rad per bin, and its inverse), cycles per frame.
@@ -191,10 +192,34 @@ impl Scene {
 
     /// Cycles of the frame of a wave vector, rad per bin.
     fn cycles(&self, q: Vector2<f64>) -> f64 {
+        self.in_cycles(&q).norm()
+    }
+
+    /// The same along both axes.
+    fn in_cycles(&self, q: &Vector2<f64>) -> Vector2<f64> {
         let rows = self.values.len() / self.columns;
-        q.component_mul(&Vector2::new(self.columns as f64, rows as f64))
-            .norm()
-            / TAU
+        q.component_mul(&Vector2::new(self.columns as f64, rows as f64)) / TAU
+    }
+
+    /// Whether some waves (rad per bin) have one direction, as stripes and their overtones.
+    pub(crate) fn are_stripes(&self, waves: &[Vector2<f64>]) -> bool {
+        let waves: Vec<Vector2<f64>> = waves.iter().map(|q| self.in_cycles(q)).collect();
+        let along = |a: &Vector2<f64>| waves.iter().all(|b| a.perp(b).abs() < LOBE * a.norm());
+        waves.iter().any(along)
+    }
+
+    /// Whether three of some waves (rad per bin), in different directions, add up to zero: they are a lattice.
+    pub(crate) fn add_up(&self, waves: &[Vector2<f64>]) -> bool {
+        let waves: Vec<Vector2<f64>> = waves.iter().map(|q| self.in_cycles(q)).collect();
+        let add_up = |a: &Vector2<f64>, b: &Vector2<f64>, c: &Vector2<f64>| {
+            let sums = [a + b + c, a + b - c, a - b + c, b + c - a];
+            a.perp(b).abs() > LOBE * a.norm() && sums.iter().any(|sum| sum.norm() < LOBE)
+        };
+        let pairs = (0..waves.len()).flat_map(|i| (0..i).map(move |j| [i, j]));
+        pairs.into_iter().any(|[i, j]| {
+            let third = waves[..j].iter();
+            third.into_iter().any(|c| add_up(&waves[i], &waves[j], c))
+        })
     }
 
     /// Wave vectors (rad per bin) and powers of all waves under a window but for background and what whole lines do.

@@ -2,15 +2,12 @@
 
 use nalgebra::Matrix2;
 
-use crate::explain::normal::{Phases, gains};
+use crate::explain::normal::{Normal, Phases, RIDGE, gains};
 use crate::explain::scene::Scene;
 use crate::frame::background::{Background, remove_background};
 use crate::frame::image::Image;
 use crate::numbers::spread::mean_and_spread;
 use crate::spectrum::shells::{FIRST_SHELL, shells};
-
-/// What rounding makes of the difference of two equal descriptions, as a fraction of the variance, and far less than noise does.
-const ROUNDING: f64 = 1e-9;
 
 /// By how much more of the variance one description predicts than another, block by block.
 #[derive(Clone, Debug)]
@@ -29,10 +26,10 @@ impl Blocks {
         )
     }
 
-    /// The mean over its standard error.
+    /// The mean over its standard error, which is no less than what the damping of amplitudes leaves of the variance, and rounding.
     pub(crate) fn standard_errors(&self) -> f64 {
         let spread = mean_and_spread(&self.0);
-        spread.value / (spread.sigma / (self.0.len() as f64).sqrt()).max(ROUNDING)
+        spread.value / (spread.sigma / (self.0.len() as f64).sqrt()).max(RIDGE * RIDGE)
     }
 }
 
@@ -51,17 +48,27 @@ pub(crate) fn weakest(image: &Image, pair: &Matrix2<f64>, bends: bool) -> Option
 fn of_image(image: &Image, pair: &Matrix2<f64>, bends: bool) -> Option<f64> {
     let scene = Scene::new(image, pair, pair)?;
     let indices = shells(3);
-    let all: Vec<usize> = (0..2 * indices.len()).collect();
     let straight = Phases::straight(pair * scene.binning as f64);
     let scene = scene.without_waves_beside(&straight.pair, &straight.pair, indices);
     let normals = Phases::shown(&scene, straight.pair, bends).normals(&scene, indices);
-    let gain = gains(&normals, &all)?;
+    weakest_family(&scene, &normals, indices)
+}
+
+/// By how many standard errors the weakest family improves the prediction. `normals`: those of the harmonics `indices`, and of waves beside them.
+pub(crate) fn weakest_family(
+    scene: &Scene,
+    normals: &[Normal],
+    indices: &[[i32; 2]],
+) -> Option<f64> {
+    let all: Vec<usize> = (0..normals[0].moment.len()).collect();
+    let gain = gains(normals, &all)?;
     FIRST_SHELL
         .into_iter()
         .try_fold(f64::INFINITY, |least, [h, k]| {
-            let others = |i: &usize| h * indices[i / 2][1] != k * indices[i / 2][0];
+            let is_other = |[i, j]: &[i32; 2]| h * j != k * i;
+            let others = |i: &usize| indices.get(i / 2).is_none_or(is_other);
             let kept: Vec<usize> = all.iter().copied().filter(others).collect();
-            let lost = Blocks::difference(&scene, &gain, &gains(&normals, &kept)?);
+            let lost = Blocks::difference(scene, &gain, &gains(normals, &kept)?);
             Some(least.min(lost.standard_errors()))
         })
 }
@@ -80,10 +87,12 @@ pub(crate) fn gain(image: &Image, pair: &Matrix2<f64>, bends: bool) -> Option<f6
 /// pixel, to within a cycle per frame.
 pub(crate) fn proposed(image: &Image, pair: &Matrix2<f64>) -> Option<(Matrix2<f64>, f64)> {
     let scene = Scene::new(image, pair, pair)?;
-    // What predicts nothing near its place is not fitted.
-    (of_image(image, pair, false)? > 0.0).then_some(())?;
     let binning = scene.binning as f64;
-    let fitted = Phases::straight(pair * binning).fitted(&scene, shells(2), 0)?;
+    let straight = Phases::straight(pair * binning);
+    // What predicts nothing near its place is not fitted.
+    let predicts = weakest_family(&scene, &straight.normals(&scene, shells(3)), shells(3))?;
+    (predicts > 0.0).then_some(())?;
+    let fitted = straight.fitted(&scene, shells(2), 0)?;
     let fitted = fitted.pair / binning;
     let frame = Matrix2::from_diagonal(&scene.half) * (binning / std::f64::consts::PI);
     let moved = frame * (fitted - pair);

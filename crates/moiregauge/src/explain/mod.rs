@@ -13,6 +13,7 @@ pub(crate) mod evidence;
 pub(crate) mod normal;
 pub(crate) mod scene;
 pub(crate) mod table;
+pub(crate) mod waves;
 
 #[cfg(test)]
 mod tests;

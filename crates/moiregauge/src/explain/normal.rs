@@ -11,7 +11,7 @@ use crate::spectrum::shells::shells;
 pub(crate) const CUBIC: usize = 7;
 
 /// Damping of amplitudes, relative to each diagonal element of the normal equations: separates harmonics that a few blocks cannot.
-const RIDGE: f64 = 1e-3;
+pub(crate) const RIDGE: f64 = 1e-3;
 /// Damping that only keeps singular equations solvable.
 const TINY: f64 = 1e-9;
 /// Terms of a quadratic background.
@@ -237,7 +237,11 @@ impl Phases {
     }
 
     /// Amplitudes of cosine and sine of all waves and of a quadratic background, and what they leave of each bin.
-    fn rest(&self, scene: &Scene, indices: &[[i32; 2]]) -> Option<(DVector<f64>, Vec<f64>)> {
+    pub(crate) fn rest(
+        &self,
+        scene: &Scene,
+        indices: &[[i32; 2]],
+    ) -> Option<(DVector<f64>, Vec<f64>)> {
         let n = 2 * (indices.len() + self.others.len()) + GROUND;
         let (mut sums, mut row) = (Sums::new(1, n), vec![0.0; n]);
         self.for_each(scene, indices, |i, _, unit, waves| {

@@ -56,10 +56,27 @@ impl Scene {
         } else {
             image.clone()
         };
-        let [columns, rows] = [binned.columns, binned.rows];
-        let there = |i: &usize| binned.values[*i].is_finite();
+        let mut scene = Self::of(&binned)?;
+        scene.binning = binning;
+        let longest = TAU / norms(coarse).into_iter().fold(f64::INFINITY, f64::min);
+        let sigma = BACKGROUND * longest / binning as f64;
+        let lines = scene.block.chunks(scene.columns);
+        let picked: Vec<bool> = lines.map(|line| line.iter().any(Option::is_some)).collect();
+        let background = gaussian_mean(&binned.values, binned.columns, sigma, &picked);
+        let values = scene.values.iter_mut().zip(&scene.block).zip(background);
+        for ((value, _), ground) in values.filter(|((_, block), _)| block.is_some()) {
+            *value -= ground;
+        }
+        clip(&mut scene.values);
+        Some(scene)
+    }
+
+    /// An image as it is, each pixel a bin.
+    pub(crate) fn of(image: &Image) -> Option<Self> {
+        let [columns, rows] = [image.columns, image.rows];
+        let there = |i: &usize| image.values[*i].is_finite();
         let place = |i: usize| Vector2::new((i % columns) as f64, (i / columns) as f64);
-        let places = (0..binned.values.len()).filter(there).map(place);
+        let places = (0..image.values.len()).filter(there).map(place);
         let (low, high) = places.fold(
             (
                 Vector2::repeat(f64::INFINITY),
@@ -82,21 +99,27 @@ impl Scene {
             let at = (place(i) - low).component_div(&extent) * BLOCKS as f64;
             (there(&i) && picked[i / columns]).then(|| at.y as usize * BLOCKS + at.x as usize)
         };
-        let longest = TAU / norms(coarse).into_iter().fold(f64::INFINITY, f64::min);
-        let sigma = BACKGROUND * longest / binning as f64;
-        let background = gaussian_mean(&binned.values, columns, sigma, &picked);
-        let block: Vec<Option<usize>> = (0..binned.values.len()).map(block).collect();
-        let without = |i: usize| block[i].map_or(0.0, |_| binned.values[i] - background[i]);
-        let mut values: Vec<f64> = (0..binned.values.len()).map(without).collect();
-        clip(&mut values);
+        let block: Vec<Option<usize>> = (0..image.values.len()).map(block).collect();
+        let value = |i: usize| block[i].map_or(0.0, |_| image.values[i]);
         Some(Self {
             columns,
+            values: (0..image.values.len()).map(value).collect(),
             block,
-            values,
-            binning,
+            binning: 1,
             middle: (low + high) / 2.0,
             half: extent / 2.0,
         })
+    }
+
+    /// The bins whose middle pixel (column, row) is in a part of the image.
+    pub(crate) fn within(mut self, holds: impl Fn([usize; 2]) -> bool) -> Self {
+        for i in 0..self.values.len() {
+            let bin = [i % self.columns, i / self.columns];
+            if !holds(bin.map(|at| at * self.binning + self.binning / 2)) {
+                (self.values[i], self.block[i]) = (0.0, None);
+            }
+        }
+        self
     }
 
     /// The place of a bin, from −1 to 1 along each axis.

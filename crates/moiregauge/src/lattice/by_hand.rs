@@ -10,7 +10,7 @@ use nalgebra::Matrix2;
 use crate::frame::background::Background;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
-use crate::lattice::ground::{WAYS, below};
+use crate::lattice::ground::below;
 use crate::lattice::measured::MeasuredLattice;
 use crate::lattice::start::Start;
 use crate::spectrum::error::LatticeError;
@@ -99,7 +99,7 @@ pub(crate) fn measure_by_hand(
     };
     let flat = levelled(image.clone(), background)?;
     let found = (method == Method::Lattice)
-        .then(|| below(&flat, geometry, background, &find, WAYS))
+        .then(|| below(&flat, geometry, background, &find))
         .flatten();
     found.ok_or(LatticeError::NotThere)
 }

@@ -19,7 +19,7 @@ use crate::frame::geometry::Geometry;
 use crate::frame::image::{Image, without};
 use crate::frame::median_ground::running_median;
 use crate::lattice::fit::fitted::LatticeFit;
-use crate::lattice::measure::{measure_pair, no_lattice};
+use crate::lattice::measure::measure_pair;
 use crate::lattice::measured::MeasuredLattice;
 use crate::lattice::start::Start;
 use crate::numbers::interrupt;
@@ -37,30 +37,21 @@ const WIDEST: f64 = 0.5;
 /// Rounds of lattice and ground: the second changes the waves by less than a tenth of their errors.
 const ROUNDS: usize = 2;
 
-/// How the lattice of an even image is found.
-type Find<'a> = &'a dyn Fn(&Arc<Image>) -> Option<MeasuredLattice>;
-
-/// How many ways there are to make an image even: with each window, with and without line offsets.
-pub(crate) const WAYS: usize = 2 * SHARES.len();
-
 /// The lattice of an image without its background, if it shows one beside spikes, ground and line offsets that are taken off. `find`: the lattice of an
-/// even image; `ways`: in how many ways it is made even, the widest window first.
+/// even image.
 pub(crate) fn below(
     image: &Image,
     geometry: &Geometry,
     background: Background,
-    find: Find,
-    ways: usize,
+    find: &dyn Fn(&Arc<Image>) -> Option<MeasuredLattice>,
 ) -> Option<MeasuredLattice> {
     let shorter = image.columns.min(image.rows) as f64;
     let calm = without_spikes(image);
     let level = without_line_offsets(&calm);
-    let of_side = |share: f64| [(&calm, share * shorter), (&level, share * shorter)];
-    let mut tries = SHARES.into_iter().flat_map(of_side).take(ways);
+    let sides = SHARES.map(|share| share * shorter).into_iter();
+    let sides = sides.filter(|side| *side >= SMALLEST);
+    let mut tries = sides.flat_map(|side| [(&calm, side), (&level, side)]);
     tries.find_map(|(calm, side)| {
-        if side < SMALLEST {
-            return None;
-        }
         interrupt::check();
         let even = cut_off(&without(calm, &running_median(calm, side as usize)));
         let signs = signs(&even);
@@ -92,7 +83,7 @@ fn on_even_ground(
             return None;
         }
         let mut again = measure_pair(&waves, part, &even, geometry, background, Method::Lattice)?;
-        if no_lattice(&again).is_some() || !same(size, &again.reciprocal, &waves) {
+        if !same(size, &again.reciprocal, &waves) {
             return None;
         }
         again.ground = Some(side as f64);

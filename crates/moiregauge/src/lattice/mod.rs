@@ -5,6 +5,7 @@
 //! vectors are mapped; nothing is resampled (but by the published method, for reproduction).
 
 pub(crate) mod autocorrelation;
+pub(crate) mod beside;
 pub(crate) mod by_hand;
 pub(crate) mod common;
 pub(crate) mod find;

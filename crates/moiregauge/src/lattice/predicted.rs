@@ -11,7 +11,7 @@ use crate::frame::background::Background;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::lattice::fit::fitted::LatticeFit;
-use crate::lattice::measure::{measure_pair, no_lattice};
+use crate::lattice::measure::measure_pair;
 use crate::lattice::measured::{Candidate, Evidence, MeasuredLattice};
 use crate::lattice::start::Start;
 use crate::spectrum::error::{LatticeError, SECOND};
@@ -32,8 +32,8 @@ pub(crate) const LEAST: f64 = 1.5;
 /// to a tenth, creep in a frame of four periods of atoms a half, and holes that pass for a coarse lattice 0.7 to 1.4.
 const MOST_CHANGE: f64 = 0.6;
 /// Fewest periods across the frame: a few protrusions can mimic a lattice. Of simulated discs with sharp edges 0.8 to 1.0 fit across the
-/// frame, of the smallest recorded images three.
-const FEWEST_PERIODS: f64 = 1.5;
+/// frame, of the smallest recorded images three; a cell √3 times too large with 1.6 was taken for a lattice in one of 400 frames of few spots.
+const FEWEST_PERIODS: f64 = 2.0;
 
 /// The lattice with several times the cell, or a part of it, that predicts the image better than the one that was found; that one if none does.
 pub(crate) fn of_better_cell(
@@ -51,8 +51,7 @@ pub(crate) fn of_better_cell(
     );
     let measured = || {
         let part = found.patch.as_ref();
-        let other = measure_pair(&nested.better?, part, image, geometry, background, method)?;
-        no_lattice(&other).is_none().then_some(other)
+        measure_pair(&nested.better?, part, image, geometry, background, method)
     };
     let mut better = measured().unwrap_or(found);
     better.larger = nested.larger;
@@ -86,15 +85,21 @@ pub(crate) fn judged(
     background: Background,
 ) -> Result<MeasuredLattice, LatticeError> {
     let (found, better) = with_evidence(found, image, geometry);
-    let found = accepted(found, geometry)?;
-    let instead = || {
-        let part = found.patch.as_ref();
-        let other = measure_pair(&better?, part, image, geometry, background, Method::Lattice)?;
+    let part = found.patch.clone();
+    let instead = |pair: Matrix2<f64>| {
+        let part = part.as_ref();
+        let other = measure_pair(&pair, part, image, geometry, background, Method::Lattice)?;
         let (other, _) = with_evidence(other, image, geometry);
-        let other = accepted(other, geometry).ok()?;
-        no_lattice(&other).is_none().then_some(other)
+        accepted(other, geometry).ok()
     };
-    Ok(instead().unwrap_or(found))
+    // A cell that is refused may be a part of one that predicts better.
+    let larger = found.larger.into_iter().flatten();
+    let larger = larger.max_by(|a, b| a.predicts.total_cmp(&b.predicts));
+    let larger = larger.filter(|larger| larger.predicts > BETTER);
+    match accepted(found, geometry) {
+        Ok(found) => Ok(better.and_then(instead).unwrap_or(found)),
+        Err(error) => larger.and_then(|larger| instead(larger.pair)).ok_or(error),
+    }
 }
 
 /// Adds to a lattice, and to the grains beside it, their evidence within their lattice regions. Also returns the reciprocal pair (rad per pixel) of a
@@ -156,7 +161,7 @@ pub(crate) fn with_evidence(
 ///
 /// # Errors
 /// [`LatticeError::OneOfMany`]: other peaks of the image could form a lattice as well. [`LatticeError::NotPredicted`]: it does not predict held-out
-/// pixels. [`LatticeError::Distorted`]: its cell is too far from a hexagon. [`LatticeError::TooFewPeriods`]: fewer than 1.5 periods fit across the frame.
+/// pixels. [`LatticeError::Distorted`]: its cell is too far from a hexagon. [`LatticeError::TooFewPeriods`]: fewer than two periods fit across the frame.
 /// [`LatticeError::NowhereTogether`]: it varies too much.
 fn accepted(
     mut found: MeasuredLattice,

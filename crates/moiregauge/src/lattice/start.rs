@@ -23,10 +23,10 @@ use crate::numbers::three::three;
 use crate::spectrum::error::{LatticeError, THIRD};
 use crate::spectrum::harmonics::{Harmonics, Windowed};
 use crate::spectrum::look::bins_for;
-use crate::spectrum::prepare::{Prepared, binned, prepare, prepare_levelled};
+use crate::spectrum::prepare::{Prepared, binned, levelled, prepare, prepare_levelled};
 use crate::spectrum::shells::shells;
 use crate::spectrum::transform::Spectrum;
-use crate::spectrum::verdict::{Verdict, refine, verdict};
+use crate::spectrum::verdict::{is_lattice, refine};
 use crate::spectrum::{known, rescue, select};
 
 /// A lattice whose waves bend so much that a transform of the whole patch does not show them has at least this many unit
@@ -87,18 +87,22 @@ impl Start {
         background: Background,
         known: &Matrix2<f64>,
     ) -> Result<Self, LatticeError> {
-        let prepared = known::prepare(image, geometry, background, known)
-            .or_else(|_| rescue::prepare_known_again(image, geometry, background, known))?;
+        let find = |image: &Image, background| known::prepare(image, geometry, background, known);
+        let prepared = find(image, background).or_else(|_| {
+            let flat = Arc::new(levelled(image.clone(), background)?);
+            rescue::prepare_again(&flat, background, find)
+        })?;
         Ok(Self::new(prepared, image, geometry, background))
     }
 
-    /// The same for an image whose lattice hides under tip events and line noise.
-    pub(crate) fn find_again(
-        image: &Image,
+    /// Looks for a lattice that hides under tip events and line noise in an image without its background.
+    pub(crate) fn find_clipped(
+        image: &Arc<Image>,
         geometry: &Geometry,
         background: Background,
     ) -> Result<Self, LatticeError> {
-        let prepared = rescue::prepare_again(image, geometry, background)?;
+        let find = |image: &Image, background| prepare(image, geometry, background);
+        let prepared = rescue::prepare_again(image, background, find)?;
         Ok(Self::new(prepared, image, geometry, background))
     }
 
@@ -196,7 +200,7 @@ impl Start {
 
     /// Whether its harmonics cannot be chance.
     pub(crate) fn is_significant(&self) -> bool {
-        verdict(&self.prepared.harmonics) == Verdict::Lattice
+        is_lattice(&self.prepared.harmonics)
     }
 
     /// The reciprocal pair, rad per pixel.

@@ -23,7 +23,7 @@ use crate::spectrum::select::{
 };
 use crate::spectrum::shells::shells;
 use crate::spectrum::transform::Spectrum;
-use crate::spectrum::verdict::{Verdict, signal_to_noise, verdict};
+use crate::spectrum::verdict::{is_lattice, signal_to_noise};
 
 /// The lattice may be smaller or larger than expected by this factor: less than √3, by which the second
 /// harmonics of a hexagon differ from the first.
@@ -63,7 +63,7 @@ pub(crate) fn prepare(
         else {
             continue;
         };
-        if verdict(&harmonics) != Verdict::Lattice && !well_explained(&candidate) {
+        if !is_lattice(&harmonics) && !well_explained(&candidate) {
             let ratios = signal_to_noise(&harmonics);
             if ratios[2] > best[2] {
                 best = ratios;

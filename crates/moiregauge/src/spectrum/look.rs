@@ -18,7 +18,7 @@ use crate::numbers::dot::dot;
 use crate::numbers::interrupt;
 use crate::spectrum::harmonics::Harmonics;
 use crate::spectrum::transform::{Spectrum, hann};
-use crate::spectrum::verdict::{Verdict, refine, signal_to_noise, verdict};
+use crate::spectrum::verdict::{is_lattice, refine, signal_to_noise};
 use crate::spectrum::{high_orders, select};
 
 /// Images of fewer pixels than twice this many are searched as they are; others in about this many bins, whose transform
@@ -69,26 +69,22 @@ impl Look {
         }
     }
 
-    /// What bins as coarse as a pair allows say of it: nothing, where they are the pixels.
-    pub(crate) fn verdict(
+    /// Whether bins as coarse as a pair allows show its lattice, and the signal-to-noise ratios of its waves there; `None` where they are the pixels.
+    pub(crate) fn shows(
         &self,
         pixels: &Image,
         pair: &Matrix2<f64>,
         background: Background,
-    ) -> Option<(Verdict, [f64; 3])> {
+    ) -> Option<(bool, [f64; 3])> {
         let bins = bins_for(pair);
         if bins == 1 {
             return None;
         }
         let (image, pair) = (self.in_bins(pixels, bins), pair * bins as f64);
         let (harmonics, _) = refine(&image, &pair, background)?;
-        let found = match verdict(&harmonics) {
-            Verdict::Chance if high_orders::refine(&image, &pair, background).is_some() => {
-                Verdict::Lattice
-            }
-            other => other,
-        };
-        Some((found, signal_to_noise(&harmonics)))
+        let high_orders = || high_orders::refine(&image, &pair, background).is_some();
+        let shows = is_lattice(&harmonics) || high_orders();
+        Some((shows, signal_to_noise(&harmonics)))
     }
 
     /// The lattice that the bins show; `pixels` is the image itself.
@@ -104,9 +100,8 @@ impl Look {
         let pair = candidates.first()?.pair;
         let (harmonics, peaks) = refine(&self.image, &pair, background)?;
         let found = Found { harmonics, peaks };
-        let sure = verdict(&found.harmonics) == Verdict::Lattice
-            && found.is_fine()
-            && found.is_in(pixels, self.bins);
+        let sure =
+            is_lattice(&found.harmonics) && found.is_fine() && found.is_in(pixels, self.bins);
         sure.then_some(found)
     }
 }

@@ -16,7 +16,7 @@ use crate::spectrum::harmonics::Harmonics;
 use crate::spectrum::look::{Look, in_other_bins};
 use crate::spectrum::phases::Phases;
 use crate::spectrum::transform::Spectrum;
-use crate::spectrum::verdict::{Verdict, refine, signal_to_noise, verdict};
+use crate::spectrum::verdict::{is_lattice, refine, signal_to_noise};
 use crate::spectrum::{high_orders, select};
 
 /// What is left of a constant or a plane when it is taken off, as a share of the values: a few hundred units of
@@ -112,8 +112,8 @@ pub(crate) fn prepare_levelled(
     let mut best = [0.0; 3];
     for candidate in select::candidates(&full, &geometry.pixel_to_nm) {
         let look = look.as_ref();
-        let roughly = look.and_then(|look| look.verdict(&image, &candidate.pair, background));
-        if let Some((Verdict::Chance, ratios)) = roughly {
+        let roughly = look.and_then(|look| look.shows(&image, &candidate.pair, background));
+        if let Some((false, ratios)) = roughly {
             best = better(best, ratios);
             continue;
         }
@@ -122,21 +122,12 @@ pub(crate) fn prepare_levelled(
         let Some((mut harmonics, mut peaks)) = refine(&binned, &pair, background) else {
             continue;
         };
-        let mut verdict = verdict(&harmonics);
-        if verdict != Verdict::Lattice
-            && let Some(found) = high_orders::refine(&binned, &pair, background)
-        {
+        if !is_lattice(&harmonics) {
+            let Some(found) = high_orders::refine(&binned, &pair, background) else {
+                best = better(best, signal_to_noise(&harmonics));
+                continue;
+            };
             (harmonics, peaks) = found;
-            verdict = Verdict::Lattice;
-        }
-        if verdict != Verdict::Lattice {
-            best = better(best, signal_to_noise(&harmonics));
-            // A strong second shell belongs to a lattice whose first shell is hidden; the lattice
-            // of the second shell alone would be a wrong answer.
-            if verdict == Verdict::Doubtful {
-                break;
-            }
-            continue;
         }
         let Some(start) = reciprocal(&harmonics.pair) else {
             continue;

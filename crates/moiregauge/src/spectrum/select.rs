@@ -370,7 +370,7 @@ pub(crate) struct NoiseMap {
 
 /// Blocks of bins in which the noise of a spectrum is read: narrow along kx, on which the noise of a scan depends,
 /// ...
-pub(crate) const BLOCK_WIDTH: usize = 4;
+const BLOCK_WIDTH: usize = 4;
 /// ... and high, so that 128 bins tell it to a tenth.
 const BLOCK_HEIGHT: usize = 32;
 

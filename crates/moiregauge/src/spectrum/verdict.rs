@@ -46,24 +46,13 @@ pub(crate) fn signal_to_noise(harmonics: &Harmonics) -> [f64; 3] {
     best
 }
 
-/// What the harmonics of a proposed lattice amount to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Verdict {
-    /// They cannot be chance.
-    Lattice,
-    /// Some of them cannot, but the first shell can.
-    Doubtful,
-    /// They can all be chance.
-    Chance,
-}
-
-/// Whether the harmonics can be chance.
+/// Whether the harmonics of a proposed lattice are more than chance.
 ///
 /// Under noise alone the significance is exponentially distributed. Two members of a shell were
 /// searched among all frequencies, so they have to exceed the expected maximum of that search; the
 /// third was not searched: the sum rule says where it has to be. The second shell may be the strong
 /// one, as long as the first, which makes the lattice, is there at all.
-pub(crate) fn verdict(harmonics: &Harmonics) -> Verdict {
+pub(crate) fn is_lattice(harmonics: &Harmonics) -> bool {
     let shell = |members: &[Harmonic]| {
         let mut s = [0.0; 3];
         for (s, h) in s.iter_mut().zip(members) {
@@ -75,13 +64,7 @@ pub(crate) fn verdict(harmonics: &Harmonics) -> Verdict {
     let is_significant = |s: [f64; 3]| s[1] > SECOND && s[2] > THIRD;
     let first = shell(&harmonics.list[..3]);
     let second = is_significant(shell(&harmonics.list[3..harmonics.list.len().min(6)]));
-    if is_significant(first) || (second && first[1] > THIRD) {
-        Verdict::Lattice
-    } else if second || first[1] > SECOND {
-        Verdict::Doubtful
-    } else {
-        Verdict::Chance
-    }
+    is_significant(first) || (second && first[1] > THIRD)
 }
 
 #[cfg(test)]
@@ -122,15 +105,15 @@ mod tests {
                 amplitude: rustfft::num_complex::Complex64::new(*ratio, 0.0),
                 noise: [1.0; 2],
             });
-            verdict(&Harmonics {
+            is_lattice(&Harmonics {
                 list: list.collect(),
                 window_sums: [1.0; 2],
                 constant: 0.0,
                 pair: Matrix2::identity(),
             })
         };
-        assert_eq!(with([9.0, 4.48, 3.47]), Verdict::Lattice);
-        assert_ne!(with([9.0, 4.47, 3.47]), Verdict::Lattice);
-        assert_ne!(with([9.0, 4.48, 3.46]), Verdict::Lattice);
+        assert!(with([9.0, 4.48, 3.47]));
+        assert!(!with([9.0, 4.47, 3.47]));
+        assert!(!with([9.0, 4.48, 3.46]));
     }
 }

@@ -17,7 +17,7 @@ const DECODED: u64 = 250;
 /// Reading a damaged file takes milliseconds; a loaded machine makes that more.
 const LONGEST: Duration = Duration::from_secs(5);
 
-/// Damaged copies of each file, or as many as `MOIREGAUGE_MUTATIONS` says: `.ci/run` asks for ten thousand.
+/// Damaged copies of each file, or as many as `MOIREGAUGE_MUTATIONS` says: `docs/draws.sh` asks for ten thousand.
 fn mutations() -> u64 {
     let asked = std::env::var("MOIREGAUGE_MUTATIONS").ok();
     asked.map_or(1000, |n| {

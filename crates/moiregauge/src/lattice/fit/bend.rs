@@ -82,13 +82,18 @@ impl Inhomogeneity {
         clipped < FOLLOWED && self.cubic > CUBIC
     }
 
-    /// What is to be added to the wave vectors (rad per pixel, a column each), and to their covariance.
-    pub(crate) fn of_the_mean(&self, clipped: f64) -> (Matrix2<f64>, Matrix4<f64>) {
+    /// What is to be added to the wave vectors (rad per pixel, a column each), and to their covariance. `followed`: the mean of the bend that the fit
+    /// was freed of.
+    pub(crate) fn of_the_mean(
+        &self,
+        clipped: f64,
+        followed: Option<Matrix2<f64>>,
+    ) -> (Matrix2<f64>, Matrix4<f64>) {
         let doubt = self.beyond(clipped);
         if self.tells_the_mean(clipped) {
-            (self.mean, self.noise + doubt)
+            (followed.unwrap_or(self.mean), self.noise + doubt)
         } else {
-            (Matrix2::zeros(), doubt)
+            (followed.unwrap_or_else(Matrix2::zeros), doubt)
         }
     }
 
@@ -127,6 +132,13 @@ pub(crate) struct Bend {
 }
 
 impl Bend {
+    /// By how much the mean of the waves over the area exceeds that of a fit without it, rad per pixel, a column each.
+    pub(crate) fn mean(&self, frame: &Frame) -> Matrix2<f64> {
+        let mean = self.slopes + mean_slopes() * &self.bends;
+        let scale = frame.edge().map(|e| 1.0 / e);
+        Matrix2::from_diagonal(&scale) * Matrix2::from_column_slice(mean.as_slice())
+    }
+
     /// No bend.
     pub(crate) fn none() -> Self {
         Self {
@@ -135,9 +147,11 @@ impl Bend {
         }
     }
 
-    pub(crate) fn add(&mut self, other: &Self) {
-        self.slopes += other.slopes;
-        self.bends += &other.bends;
+    pub(crate) fn and(&self, other: &Self) -> Self {
+        Self {
+            slopes: self.slopes + other.slopes,
+            bends: &self.bends + &other.bends,
+        }
     }
 
     /// ψ₁ and ψ₂ at (X, Y), rad.

@@ -20,6 +20,7 @@ use crate::lattice::fit::lines::LineStatistics;
 use crate::lattice::fit::model::{Clip, LineOffsets, Model, look, settled};
 use crate::lattice::fit::noise::ResidualNoise;
 use crate::lattice::fit::places::{InPlaces, Places};
+use crate::lattice::fit::straight::Followed;
 use crate::lattice::fit::tables::Tables;
 use crate::lattice::fit::{bend, closure, frame, solve};
 use crate::numbers::dot::dot;
@@ -292,6 +293,15 @@ impl<'a> Fit<'a> {
         }
     }
 
+    /// Takes the waves of the fit to another image with the same pixels.
+    pub(crate) fn refit(&mut self, image: &Image) -> Option<()> {
+        let mut again = self.in_image(image);
+        again.converge()?;
+        let (model, gram, gradient) = (again.model, again.gram, again.gradient);
+        (self.model, self.gram, self.gradient) = (model, gram, gradient);
+        Some(())
+    }
+
     /// The share of the pixels whose residuals are cut off.
     pub(crate) fn clipped(&self) -> f64 {
         self.clipped as f64 / self.frame.pixels() as f64
@@ -342,7 +352,7 @@ impl<'a> Fit<'a> {
     }
 
     /// How the lattice changes across the frame.
-    fn inhomogeneity(&self, noise: &FinalNoise) -> Option<Inhomogeneity> {
+    pub(crate) fn inhomogeneity(&self, noise: &FinalNoise) -> Option<Inhomogeneity> {
         let (bends, acting) = (&noise.bends, noise.acting());
         let gram = self.bent_gram(noise);
         let found = bend::inhomogeneity(&self.frame, &self.model, gram, bends, &acting);
@@ -366,7 +376,8 @@ impl<'a> Fit<'a> {
             .collect()
     }
 
-    pub(crate) fn result(&self, noise: &FinalNoise) -> Option<(Lattice<Px>, LatticeFit)> {
+    pub(crate) fn result(&self, followed: &Followed) -> Option<(Lattice<Px>, LatticeFit)> {
+        let noise = &followed.noise;
         let scale = self.frame.edge().map(|e| 1.0 / e);
         let harmonics = self.harmonics(noise);
         let strengths: Vec<f64> = harmonics.iter().map(|h| h.signal_to_noise).collect();
@@ -379,7 +390,7 @@ impl<'a> Fit<'a> {
         );
         let covariance = self.covariance(noise)?;
         let enlargement = closure.map_or(1.0, |closure| closure.enlargement());
-        let inhomogeneity = self.inhomogeneity(noise);
+        let inhomogeneity = followed.change;
         let mut wave_vectors = Waves::new(
             self.model.pair,
             covariance.fixed_view::<4, 4>(3, 3) * enlargement,
@@ -387,7 +398,7 @@ impl<'a> Fit<'a> {
         .mapped(&Matrix2::from_diagonal(&scale));
         let clipped = self.clipped();
         if let Some(change) = inhomogeneity.filter(Inhomogeneity::is_significant) {
-            let (mean, covariance) = change.of_the_mean(clipped);
+            let (mean, covariance) = change.of_the_mean(clipped, followed.mean);
             wave_vectors.basis += mean;
             wave_vectors.covariance += covariance;
         }

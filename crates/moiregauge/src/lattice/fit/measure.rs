@@ -37,7 +37,7 @@ pub(crate) fn measure(
         fit = new()?;
     }
     let noise = fit.choose()?;
-    let noise = without_bend(&fit, noise);
-    let (lattice, fit) = fit.result(&noise)?;
+    let followed = without_bend(&mut fit, noise);
+    let (lattice, fit) = fit.result(&followed)?;
     Some(Found { lattice, fit })
 }

@@ -6,7 +6,6 @@
 //! [`local`](crate::lattice::fit::local).
 
 use std::f64::consts::PI;
-use std::sync::OnceLock;
 
 use nalgebra::Vector2;
 
@@ -15,7 +14,6 @@ use crate::lattice::fit::leverage::{ALONG, Leverage};
 use crate::lattice::fit::local::{Bin, acting_on};
 use crate::numbers::median::median;
 use crate::spectrum::fourier::wide;
-use crate::spectrum::select::{BLOCK_WIDTH, NoiseMap};
 use crate::spectrum::transform::{Spectrum, hann};
 
 /// Power over noise of the highest bin near a frequency where a harmonic is tried: a third of what the information criterion asks of one.
@@ -31,8 +29,6 @@ pub(super) const BESIDE: i64 = 2;
 pub(crate) struct ResidualNoise {
     /// In single precision: noise is known to a few per cent.
     spectrum: Spectrum<f32>,
-    /// Its noise in blocks, calculated at first use.
-    blocks: OnceLock<NoiseMap>,
     /// `Σ w²` of the window over the pixels that are used.
     window_power: f64,
     pub(super) free_lines: bool,
@@ -61,7 +57,6 @@ impl ResidualNoise {
         let noise = Self {
             window_power: x.iter().sum::<f64>() * lines - missing,
             spectrum,
-            blocks: OnceLock::new(),
             free_lines,
         };
         (noise, said)
@@ -157,31 +152,5 @@ impl ResidualNoise {
             .map(|value| wide(*value).norm_sqr());
         let mut powers: Vec<f64> = powers.collect();
         median(&mut powers) / (std::f64::consts::LN_2 * self.window_power)
-    }
-
-    /// Noise power around a frequency (cycles per frame), in the units of a power over noise.
-    pub(crate) fn noise_near(&self, k: Vector2<f64>) -> f64 {
-        // k and −k are the same wave of a real image.
-        let k = if k.x < 0.0 { -k } else { k }.map(|c| c.round() as i64);
-        let rows = self.spectrum.rows as i64;
-        let row = self.blocks().row(k.y.rem_euclid(rows) as usize);
-        let block = k.x as usize / BLOCK_WIDTH;
-        row.get(block).copied().unwrap_or(1.0)
-    }
-
-    fn blocks(&self) -> &NoiseMap {
-        self.blocks.get_or_init(|| NoiseMap::new(&self.spectrum))
-    }
-
-    /// Noise power per pixel around a frequency (cycles per frame).
-    pub(super) fn level_near(&self, k: Vector2<f64>) -> f64 {
-        self.noise_near(k) / self.window_power
-    }
-
-    /// Power over noise that noise alone exceeds once in about ten thousand images of this size.
-    pub(super) fn threshold(&self) -> f64 {
-        let bins = self.spectrum.values.len() as f64;
-        // The local noise is known to a fifth or so, hence the factor.
-        1.3 * (bins.ln() + 9.0)
     }
 }

@@ -12,7 +12,6 @@ use crate::frame::clip::cut_off;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::lattice::start::{FEWEST_CELLS, HANN, Start, evidence};
-use crate::spectrum::verdict::{Verdict, verdict};
 
 impl Start {
     /// Looks for the lattices of parts of the frame, that near `first` among them, and takes the one with the most
@@ -49,12 +48,12 @@ impl Start {
             if !start.is_significant() && settled.is_plain() && settled.is_straight() {
                 continue;
             }
-            let coherent = match verdict(&start.prepared.harmonics) {
-                // A part of the frame is chosen by its waves: they have to be plain to see in it.
-                Verdict::Lattice if patch.share > WHOLE || settled.is_plain() => {
-                    evidence(&start.prepared.harmonics)
-                }
-                _ => 0.0,
+            // A part of the frame is chosen by its waves: they have to be plain to see in it.
+            let is_shown = patch.share > WHOLE || settled.is_plain();
+            let coherent = if is_shown && start.is_significant() {
+                evidence(&start.prepared.harmonics)
+            } else {
+                0.0
             };
             let plain = settled.is_plain() && patch.unit_cells > FEWEST_CELLS;
             let local = if plain {
