@@ -17,6 +17,8 @@ use heterostrain::{ComplexPair, Estimate};
 use nalgebra::{Matrix2, Matrix3, Matrix3x4, Vector3};
 use serde::{Deserialize, Serialize};
 
+use crate::frame::geometry::Geometry;
+
 /// A lattice whose cell is known.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -179,6 +181,9 @@ pub struct Calibration {
     pub covariance: [[f64; 3]; 3],
     /// Whether it is that of position sensors.
     pub coordinates: Coordinates,
+    /// How position sensors bend; `None` where no bend was seen.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub curvature: Option<Curvature>,
     /// Sizes of the frames it was measured with, nm (fast, slow).
     #[serde(default)]
     pub sizes_nm: Vec<[f64; 2]>,
@@ -227,6 +232,7 @@ impl Calibration {
             covariance: [0, 1, 2]
                 .map(|i| [0, 1, 2].map(|j| covariance[(i, j)] * UNITS[i] * UNITS[j])),
             coordinates,
+            curvature: None,
             sizes_nm: Vec::new(),
             line_rates_hz: Vec::new(),
         }
@@ -260,9 +266,17 @@ impl Calibration {
             .then(|| self.distortion().try_inverse())?
     }
 
+    /// Positions as the sensors show them, freed of what the sensors bend.
+    pub(crate) fn unbent(&self, recorded: &Geometry) -> Geometry {
+        let of_these = recorded.from_sensors && self.coordinates == Coordinates::Sensors;
+        let curvature = self.curvature.as_ref().filter(|_| of_these);
+        curvature.map_or_else(|| recorded.clone(), |bent| bent.without(recorded))
+    }
+
     /// What is wrong with the numbers, or why they can be those of no scanner; `None` where they can be used.
     pub fn problem(&self) -> Option<String> {
-        self.nonsense().or_else(|| self.implausible())
+        let curvature = self.curvature.as_ref().and_then(Curvature::problem);
+        self.nonsense().or(curvature).or_else(|| self.implausible())
     }
 
     /// Why these can be the numbers of no scanner, or are too uncertain to correct anything with.
@@ -455,5 +469,8 @@ fn by_name(lattice: &Lattice, inverse: &Matrix2<f64>) -> Shown {
     }
 }
 
+pub(crate) mod curvature;
 #[cfg(test)]
 mod tests;
+
+pub use curvature::Curvature;

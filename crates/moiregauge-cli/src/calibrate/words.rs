@@ -69,7 +69,17 @@ pub(super) fn summary(calibration: &CalibrationFound) -> String {
         );
     }
     let [x, y] = calibration.gains().map(plus_minus);
-    let _ = writeln!(text, "  which is      x {x} %, y {y} %\n");
+    let _ = writeln!(text, "  which is      x {x} %, y {y} %");
+    let sizes = found.calibration.sizes_nm.iter().flatten();
+    let range = sizes.copied().fold(0.0, f64::max);
+    if let Some(curvature) = &found.calibration.curvature {
+        let [x, y] = curvature.bends(range).map(|e| plus_minus(e.scaled(100.0)));
+        let _ = writeln!(
+            text,
+            "  bends         x {x} %, y {y} % of {range:.4} nm: how far the sensors depart from straight lines"
+        );
+    }
+    text.push('\n');
     caveats(&mut text, found.caveats.iter().map(Into::into), hints::of);
     text
 }

@@ -20,6 +20,7 @@ const HEAD: &str = "\
 #   g  mismatch_percent    lengths along x are too long by this much more than along y
 #   c  orthogonality_mrad  the angle between the axes in the image is 90° less this
 # F is symmetric by definition: a known lattice of unknown orientation does not show a turn.
+#   curvature, where the position sensors bend: second derivatives of what is shown along x by (xx, xy, yy), then along y, per µm
 # covariance is that of (s, g, c) in these units. It holds for scans under the same conditions.
 
 ";

@@ -192,7 +192,7 @@ impl Scans<'_> {
         let drift_change = change_of_drift(&maps).filter(|_| !ruled);
         doubts::about_change(drift_change, &mut caveats);
         let unbent = TwistStrainMap::new(&lattices, &found);
-        let of_bends = lattices.of_bends(&reference, layers, convention, &settings.calibration);
+        let of_bends = lattices.of_bends(&reference, layers, convention, settings);
         let by_nodes = maps.iter().all(|m| m.ruler.is_some_and(|(_, nodes)| nodes));
         let map = match of_bends {
             Ok(of_bends) if !by_nodes => unbent.with_bends(&of_bends),

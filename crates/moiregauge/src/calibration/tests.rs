@@ -11,6 +11,7 @@ fn calibration(values: [f64; 3], covariance: [[f64; 3]; 3]) -> Calibration {
         orthogonality_mrad: values[2],
         covariance,
         coordinates: Coordinates::Nominal,
+        curvature: None,
         sizes_nm: Vec::new(),
         line_rates_hz: Vec::new(),
     }

@@ -17,7 +17,9 @@ use heterostrain::lattice::Lattice;
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 use spmfile::{FrameDirection, LineDirection};
 
-use crate::calibration::{Calibration, Coordinates, KnownLattice, Shown, shown};
+use crate::calibration::{
+    Calibration, Coordinates, Curvature, KnownLattice, Shown, curvature, shown,
+};
 use crate::campaign::alike::{Alike, alike};
 use crate::campaign::group::{Group, groups};
 use crate::campaign::identity::once;
@@ -180,7 +182,14 @@ pub fn calibrate(
     let covariance = covariance * scale + size * size.transpose();
     let covariance_known = sets.iter().filter(|s| used(s)).all(|s| s.known);
     let in_units = Calibration::new(&values, &statistical, coordinates).estimates();
+    let lines = sets.iter().filter(|s| used(s));
+    let lines = lines.flat_map(|s| &s.group.scans).flat_map(|s| &s.lines);
+    let bends: Vec<_> = match coordinates {
+        Coordinates::Sensors => lines.filter_map(curvature::seen).collect(),
+        Coordinates::Nominal => Vec::new(),
+    };
     let calibration = Calibration {
+        curvature: Curvature::of(&bends),
         sizes_nm,
         line_rates_hz,
         ..Calibration::new(&values, &covariance, coordinates)

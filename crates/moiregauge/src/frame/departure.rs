@@ -171,6 +171,19 @@ impl Departure {
         }
     }
 
+    /// With more terms.
+    #[must_use]
+    pub(crate) fn with_terms(mut self, terms: impl IntoIterator<Item = Term>) -> Self {
+        self.terms.extend(terms);
+        self
+    }
+
+    /// The steps of u and v from pixel to pixel, and both at (column, row).
+    pub(crate) fn units(&self, place: Vector2<f64>) -> (Vector2<f64>, Vector2<f64>) {
+        let (first, step) = (Vector2::from(self.first), Vector2::from(self.step));
+        (step, first + step.component_mul(&place))
+    }
+
     fn degree(&self) -> usize {
         self.terms.iter().map(|t| t.along).max().unwrap_or(0)
     }

@@ -15,7 +15,7 @@ use crate::map::displacement;
 use crate::map::gauge::Gauge;
 use crate::map::nodes::{Grid, LatticeNode};
 use crate::map::scanner::straight;
-use crate::settings::knobs::Calibration;
+use crate::settings::knobs::Settings;
 use crate::window::mask::Mask;
 use crate::window::types::WaveMap;
 
@@ -115,7 +115,7 @@ impl LatticeMap {
         reference: &Matrix2<f64>,
         bilayer: impl Into<Bilayer<'a>>,
         convention: StrainConvention,
-        calibration: &Calibration,
+        settings: &Settings,
     ) -> Result<Vec<[f32; 3]>, StrainError> {
         let exact = Waves::exact(*reference);
         let no_area = StrainError::NoArea {
@@ -131,9 +131,10 @@ impl LatticeMap {
             let covariance = branch.at(&stretched).map(|found| found.covariance);
             covariance.map_or([f64::NAN; 3], |c| [0, 2, 3].map(|i| c[(i, i)]))
         });
-        let share = calibration.bends(self.bends.from_sensors);
+        let shares = settings.bends(&self.bends);
         let of = |node: usize| {
-            let stretch = share * self.bends.stretch(self.grid.place(node));
+            let stretch = self.bends.stretch(self.grid.place(node));
+            let stretch = stretch.component_mul(&shares);
             let [along_x, along_y] = variances;
             let variance =
                 |i: usize| stretch.x.powi(2) * along_x[i] + stretch.y.powi(2) * along_y[i];

@@ -5,8 +5,6 @@ use spmfile::{LineDirection, Scan};
 
 use crate::frame::departure::Departure;
 use crate::frame::image::Image;
-use crate::lattice::fit::fitted::LatticeFit;
-use crate::lattice::several::together::model;
 use crate::scan::channel::{channels, flat_image_of};
 use crate::scan::measured::{MeasuredLine, MeasuredScan};
 use crate::scan::place::Place;
@@ -48,18 +46,13 @@ pub fn fitted(
         .find(|c| c.line_direction.unwrap_or(LineDirection::Trace) == line)?;
     let image = flat_image_of(channel, settings.background);
     let place = Place::of("", scan, channel, settings, &mut Vec::new());
-    // Several lattices are fitted together on a straight grid.
-    let place = place.filter(|_| settings.moires < 2);
     let displacement = place.and_then(|place| place.geometry.displacement());
     let (cell, cell_step) = mean_cell(&image, found, displacement.as_ref())?;
     let fit = found.lattice.fit.as_ref();
     Some(Fitted {
         unit: channel.plain_unit(),
         residual: fit.map(|fit| {
-            let waves = match &displacement {
-                Some(displacement) => bent_model(fit, &image, displacement),
-                None => model(fit, &image),
-            };
+            let waves = fit.waves(&image, displacement.as_ref());
             let left = image.values.iter().zip(&waves).map(|(v, w)| v - w);
             Image::new(image.rows, image.columns, left.collect())
         }),
@@ -67,36 +60,6 @@ pub fn fitted(
         cell_step,
         pixel_nm: channel.pitch_nm(),
     })
-}
-
-/// The waves of a fit on a scanner that is bent: `Σ A cos(q·(n + U(n) − centre) + φ)`.
-fn bent_model(fit: &LatticeFit, image: &Image, displacement: &Departure) -> Vec<f64> {
-    let waves: Vec<_> = fit
-        .harmonics
-        .iter()
-        .map(|h| {
-            (
-                h,
-                fit.wave_vectors.basis * Vector2::from(h.index.map(f64::from)),
-            )
-        })
-        .collect();
-    let of_line = |row: usize| {
-        let off = displacement
-            .line(row, image.columns)
-            .into_iter()
-            .enumerate();
-        let places = off
-            .map(move |(column, off)| Vector2::new(column as f64, row as f64) + off - fit.centre);
-        let value = |at| {
-            waves
-                .iter()
-                .map(|(h, q)| h.amplitude * (q.dot(&at) + h.phase).cos())
-                .sum()
-        };
-        places.map(value).collect::<Vec<f64>>()
-    };
-    (0..image.rows).flat_map(of_line).collect()
 }
 
 /// The mean over the cells of the part that carries the lattice, as a picture in the axes of the image; and the pixels

@@ -95,14 +95,9 @@ pub fn measure_moires(
         let several = |image, geometry: &Geometry| {
             measure_several(&image, geometry, background, settings.moires)
         };
-        // Several lattices are fitted together on a straight grid.
-        let plane = Geometry {
-            departure: None,
-            ..geometry.clone()
-        };
-        let (find, geometry): (Find, _) = match settings.moires {
-            0 | 1 => (&one, geometry),
-            _ => (&several, &plane),
+        let find: Find = match settings.moires {
+            0 | 1 => &one,
+            _ => &several,
         };
         let mut layers = settings.ruler_layers();
         layers.retain(|layer| atoms::may_show(geometry, layer));

@@ -127,10 +127,10 @@ impl MeasuredLine {
         let inverse = j.try_inverse().unwrap_or_else(Matrix2::zeros);
         let pitch = |sigma| j * Matrix2::from_diagonal(&Vector2::from(sigma)) * inverse;
         let place = self.geometry.place(self.lattice.middle);
-        let bends = settings.calibration.bends(self.geometry.from_sensors);
+        let bends = self.geometry.bends();
         GridErrors {
             pitch: self.pitch_sigma.map_or_else(Matrix2::zeros, pitch),
-            shape: self.geometry.bends().stretch(place) * bends,
+            shape: bends.stretch(place).component_mul(&settings.bends(&bends)),
         }
     }
 

@@ -59,8 +59,8 @@ impl Place {
             _ => Grid::Curved,
         };
         let sensors = usable_sensors(file, scan, channel, nominal.as_ref(), grid, caveats);
-        // Other methods, and several moirés at once, have no use for it.
-        let used = settings.method == Method::Lattice && settings.moires < 2;
+        // Other methods have no use for it.
+        let used = settings.method == Method::Lattice;
         let recorded = match &sensors {
             Some(sensors) => sensors.geometry.clone(),
             None if used => without_hysteresis(file, scan, channel, nominal.clone()?, caveats),
@@ -80,13 +80,18 @@ impl Place {
 
     /// Of an image whose positions, before any calibration, and times are known.
     pub(crate) fn given(recorded: &Geometry, timing: Option<Timing>, settings: &Settings) -> Self {
-        let scanner = settings.scanner.as_ref().and_then(Calibration::map);
+        let scanner = settings.scanner.as_ref();
+        let geometry = match scanner {
+            Some(scanner) if settings.method != Method::Paper => scanner.unbent(recorded),
+            _ => recorded.clone(),
+        };
+        let scanner = scanner.and_then(Calibration::map);
         Self {
             line: LineDirection::Trace,
             nominal: None,
             sensors: None,
             recorded: recorded.clone(),
-            geometry: calibrated(recorded, scanner.as_ref()),
+            geometry: scanner.map_or_else(|| geometry.clone(), |map| geometry.mapped(&map)),
             timing,
             scanner,
         }
@@ -94,11 +99,10 @@ impl Place {
 
     /// The place of a block of pixels that starts at (column, row).
     pub(crate) fn cropped(self, first: [usize; 2], size: [usize; 2]) -> Self {
-        let recorded = self.recorded.cropped(first, size);
         Self {
             nominal: self.nominal.map(|n| n.cropped(first, size)),
-            geometry: calibrated(&recorded, self.scanner.as_ref()),
-            recorded,
+            geometry: self.geometry.cropped(first, size),
+            recorded: self.recorded.cropped(first, size),
             ..self
         }
     }
@@ -162,8 +166,4 @@ fn without_hysteresis(
         departure: Some(Arc::new(departure)),
         ..nominal
     }
-}
-
-fn calibrated(geometry: &Geometry, map: Option<&Matrix2<f64>>) -> Geometry {
-    map.map_or_else(|| geometry.clone(), |map| geometry.mapped(map))
 }

@@ -2,9 +2,11 @@
 
 use heterostrain::material::{Bilayer, Material};
 use heterostrain::strain::{KnownOrientation, StrainConvention, TwistSense};
+use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
 use crate::frame::background::Background;
+use crate::frame::grid_errors::Bends;
 use crate::settings::by_hand::ByHand;
 use crate::spectrum::method::Method;
 
@@ -87,18 +89,6 @@ pub struct Calibration {
     pub sensor_bend_percent: f64,
     /// The same of a scanner that no sensor recorded: hysteresis bends lines by a per cent.
     pub scanner_bend_percent: f64,
-}
-
-impl Calibration {
-    /// The share of the range by which positions may be bent.
-    pub(crate) fn bends(&self, from_sensors: bool) -> f64 {
-        let percent = if from_sensors {
-            self.sensor_bend_percent
-        } else {
-            self.scanner_bend_percent
-        };
-        percent / 100.0
-    }
 }
 
 impl Default for Calibration {
@@ -234,6 +224,19 @@ pub struct Settings {
 }
 
 impl Settings {
+    /// The shares of their ranges by which x and y may be bent: what a calibration of the sensors leaves, or what is assumed.
+    pub(crate) fn bends(&self, bends: &Bends) -> Vector2<f64> {
+        let assumed = &self.calibration;
+        let percent = match bends.from_sensors {
+            true => assumed.sensor_bend_percent,
+            false => assumed.scanner_bend_percent,
+        };
+        let measured = self.scanner.as_ref().filter(|_| bends.from_sensors);
+        measured
+            .and_then(|scanner| scanner.curvature.as_ref())
+            .map_or(Vector2::repeat(percent / 100.0), |c| c.shares(bends.range))
+    }
+
     /// The settings for the moiré `index` (0 has the largest cell): `material` and `substrate` are its own.
     #[must_use]
     pub fn of_moire(&self, index: usize) -> Self {

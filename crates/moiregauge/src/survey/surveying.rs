@@ -244,8 +244,7 @@ impl SurveyPlan {
         let found = lattices
             .twist_strain(&self.whole, layers, convention)
             .map_err(SurveyError::Strain)?;
-        let bends = &self.settings.calibration;
-        let of_bends = lattices.of_bends(&self.whole, layers, convention, bends);
+        let of_bends = lattices.of_bends(&self.whole, layers, convention, &self.settings);
         let of_bends = of_bends.map_err(SurveyError::Strain)?;
         Ok(TwistStrainMap::new(&lattices, &found).with_bends(&of_bends))
     }

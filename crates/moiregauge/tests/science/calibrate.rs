@@ -12,6 +12,7 @@ use moiregauge::settings::{Grouping, Settings};
 use moiregauge::simulate::{Pattern, Simulation, Simulator};
 use nalgebra::Matrix2;
 use rayon::prelude::*;
+use spmfile::{Channel, LineDirection, Samples, Scan};
 
 use crate::draws::draws;
 
@@ -373,6 +374,7 @@ fn what_no_scanner_can_be_is_refused() {
         orthogonality_mrad: 5.0,
         covariance: [[0.01, 0.0, 0.0], [0.0, 0.01, 0.0], [0.0, 0.0, 0.1]],
         coordinates: Coordinates::Sensors,
+        curvature: None,
         sizes_nm: vec![[5.0; 2]],
         line_rates_hz: vec![4.0],
     };
@@ -440,4 +442,102 @@ fn calibrates(source: Source) -> bool {
         source,
         Source::Gain | Source::Mismatch | Source::Orthogonality
     )
+}
+
+/// By (xx, xy, yy) of x, then of y, per µm: a third of a per cent of a range of 5 nm and less.
+const BENT: [f64; 6] = [4.8, -1.5, 0.9, 0.6, 1.2, -4.2];
+
+/// The sensors of a frame show what is bent about a place (nm).
+fn bent(scan: &mut Scan, about: [f64; 2]) {
+    for line in [LineDirection::Trace, LineDirection::Retrace] {
+        let of = |scan: &Scan, name: &str| {
+            let named = |c: &Channel| c.name == name && c.line_direction == Some(line);
+            scan.channels.iter().position(named).unwrap()
+        };
+        let [x, y] = ["Xsensor", "Ysensor"].map(|name| of(scan, name));
+        let places = [x, y].map(|i| scan.channels[i].values());
+        for (axis, channel) in [x, y].into_iter().enumerate() {
+            let [xx, xy, yy] = [0, 1, 2].map(|k| BENT[3 * axis + k] / 1000.0);
+            let shown = places[0].iter().zip(&places[1]).enumerate();
+            let shown = shown.map(|(i, (x, y))| {
+                let (dx, dy) = (x - about[0], y - about[1]);
+                places[axis][i] + 0.5 * (xx * dx * dx + 2.0 * xy * dx * dy + yy * dy * dy)
+            });
+            let channel = &mut scan.channels[channel];
+            channel.samples = Samples::F64(shown.collect());
+            (channel.scale, channel.offset) = (1.0, 0.0);
+        }
+    }
+}
+
+/// Frames of atoms tell how sensors bend; with it a uniform moiré is none that changes.
+#[test]
+fn sensors_that_bend_are_calibrated() {
+    let with_sensors = |mut set: Simulation| {
+        set.raster.sensors = true;
+        set.window.gain = [1.0; 2];
+        set.window.shear_mrad = 0.0;
+        set.noise.sensor_nm = 0.02;
+        set
+    };
+    let frames = |set: &Simulation, is_bent: bool| {
+        let simulator = Simulator::new(set.clone()).unwrap();
+        let frames = (0..simulator.frames()).map(|i| {
+            let mut scan = simulator.frame(i);
+            let mean = |name: &str| {
+                let channel = scan.channels.iter().find(|c| c.name == name).unwrap();
+                channel.values().iter().sum::<f64>() / channel.values().len() as f64
+            };
+            let about = ["Xsensor", "Ysensor"].map(mean);
+            if is_bent {
+                bent(&mut scan, about);
+            }
+            (Simulator::file_name(i), scan)
+        });
+        frames.collect::<Vec<_>>()
+    };
+    let known = exact();
+    let cell = known.cell().unwrap();
+    let mut pulls = Vec::new();
+    let mut told = None;
+    for seed in 0..12 {
+        let mut set = with_sensors(atoms(seed));
+        set.raster.pixels = [128; 2];
+        set.raster.nominal_size_nm = [5.0; 2];
+        let of = |is_bent| {
+            let scans = frames(&set, is_bent).into_iter().map(|(name, scan)| {
+                measure_known(&name, &scan, &Settings::default(), &cell).unwrap()
+            });
+            let found = calibrate(scans.collect(), &known, 1.0 / 60.0, Grouping::Auto);
+            found.unwrap().calibration
+        };
+        assert_eq!(of(false).curvature, None, "{seed}");
+        let found = of(true);
+        let curvature = found.curvature.clone().unwrap();
+        for i in 0..6 {
+            pulls.push((curvature.per_um[i] - BENT[i]) / curvature.covariance[i][i].sqrt());
+        }
+        told = Some(found);
+    }
+    let rms = (pulls.iter().map(|p| p * p).sum::<f64>() / pulls.len() as f64).sqrt();
+    assert!((0.6..1.4).contains(&rms), "{rms} {pulls:?}");
+
+    let mut moire = with_sensors(Simulation::default());
+    moire.raster.pixels = [128; 2];
+    moire.raster.scans = 2;
+    moire.raster.nominal_size_nm = [20.0; 2];
+    moire.sample.twist_deg = 4.0;
+    let changes = |scanner: Option<&Calibration>| {
+        let settings = Settings {
+            scanner: scanner.cloned(),
+            ..Settings::default()
+        };
+        let of = |(name, scan): &(String, Scan)| {
+            let found = measure_scan(name, scan, &settings, None).unwrap();
+            found.lines.iter().any(|l| l.lattice.change.is_some())
+        };
+        frames(&moire, true).iter().map(of).collect::<Vec<_>>()
+    };
+    assert_eq!(changes(None), [true; 2]);
+    assert_eq!(changes(told.as_ref()), [false; 2]);
 }

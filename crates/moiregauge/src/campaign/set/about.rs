@@ -67,7 +67,7 @@ fn about_bends(set: &SetAnalysis, settings: &Settings, caveats: &mut Vec<Caveat>
         .map(|c| c.wavelength.max(c.angle))
         .fold(0.0, f64::max);
     // Stretches of 8sx/R, x over R.
-    let bends = settings.calibration.bends(false) * 8.0 / 12f64.sqrt();
+    let bends = settings.calibration.scanner_bend_percent / 100.0 * 8.0 / 12f64.sqrt();
     if change > 0.0 && change < 2.0 * bends {
         let doubt = SetDoubt::ChangeOfScanner { change, bends };
         caveats.push(Caveat::new(doubt, &set.name));

@@ -14,7 +14,7 @@
 //! # References
 //! Rao, Proc. Camb. Phil. Soc. 44, 50 (1948), score test.
 
-use nalgebra::{DMatrix, DVector, Matrix2, Matrix4, Vector2, Vector4};
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix4, Matrix6, Vector2, Vector4, Vector6};
 use serde::{Deserialize, Serialize};
 
 use crate::lattice::fit::folded::Bends;
@@ -61,6 +61,18 @@ pub struct Inhomogeneity {
     /// χ² of the eight numbers of the third order, of which the mean is made.
     #[serde(with = "exact")]
     pub cubic: f64,
+    /// The terms of the second order.
+    #[serde(skip)]
+    pub(crate) second: SecondOrder,
+}
+
+/// Second derivatives of the phases by the pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct SecondOrder {
+    /// Of ψ₁ by (xx, xy, yy), then of ψ₂, rad.
+    pub(crate) values: Vector6<f64>,
+    /// What noise makes of them.
+    pub(crate) covariance: Matrix6<f64>,
 }
 
 /// Where fewer residuals than this share are cut off, three times what Gaussian noise has, the fit follows a lattice that bends, and
@@ -139,6 +151,11 @@ impl Bend {
         Matrix2::from_diagonal(&scale) * Matrix2::from_column_slice(mean.as_slice())
     }
 
+    /// Second derivatives of the phases by the pixel.
+    pub(crate) fn second(&self, frame: &Frame) -> Vector6<f64> {
+        Vector6::from_fn(|i, _| self.bends[second_order()[i]] * second_derivatives(frame)[i])
+    }
+
     /// No bend.
     pub(crate) fn none() -> Self {
         Self {
@@ -196,10 +213,17 @@ pub(crate) fn inhomogeneity(
     let scale = frame.edge().map(|e| 1.0 / e);
     let to_pixels = Matrix4::from_diagonal(&Vector4::new(scale.x, scale.y, scale.x, scale.y));
     let of_mean = to_pixels * (mean_slopes() - coupling.transpose());
-    let shift = &of_mean * bend;
-    let noise = &of_mean * &inverse * variance * inverse * of_mean.transpose();
+    let shift = &of_mean * &bend;
+    let spread = &inverse * variance * &inverse;
+    let noise = &of_mean * &spread * of_mean.transpose();
     let slopes = -coupling.transpose() * &told;
+    let derivatives = second_derivatives(frame);
+    let second = |i: usize, j: usize| spread[(second_order()[i], second_order()[j])];
     let inhomogeneity = Inhomogeneity {
+        second: SecondOrder {
+            values: Vector6::from_fn(|i, _| bend[second_order()[i]] * derivatives[i]),
+            covariance: Matrix6::from_fn(|i, j| second(i, j) * derivatives[i] * derivatives[j]),
+        },
         wavelength,
         angle,
         chi_squared,
@@ -216,6 +240,18 @@ pub(crate) fn inhomogeneity(
             bends: told,
         },
     ))
+}
+
+/// Which of the bends are of the second order: (xx, xy, yy) of ψ₁, then of ψ₂.
+fn second_order() -> [usize; 6] {
+    [0, 1, 2, BENDS, BENDS + 1, BENDS + 2]
+}
+
+/// What their derivatives by the pixel are.
+fn second_derivatives(frame: &Frame) -> [f64; 6] {
+    let [x, y] = frame.edge().map(|e| 1.0 / e).into();
+    let of_one = [2.0 * x * x, x * y, 2.0 * y * y];
+    [0, 1, 2, 3, 4, 5].map(|i| of_one[i % 3])
 }
 
 /// Which of the bends are of the third order.

@@ -2,12 +2,15 @@
 
 use heterostrain::lattice::{Px, Waves};
 use nalgebra::{Matrix2, Matrix3, Vector2};
+use rustfft::num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
+use crate::frame::departure::Departure;
+use crate::frame::image::Image;
 use crate::lattice::fit::bend::Inhomogeneity;
 use crate::lattice::fit::closure::Closure;
-use crate::lattice::fit::frame;
 use crate::lattice::fit::left::LeftOver;
+use crate::lattice::fit::{frame, waves};
 use crate::numbers::exact;
 use crate::numbers::three::three;
 use crate::spectrum::phases::Phases;
@@ -97,6 +100,15 @@ impl LatticeFit {
         self.inhomogeneity.as_ref().filter(|c| c.is_significant())
     }
 
+    /// `Σ A cos(q·(n + U − centre) + φ)` on the pixels n of `image`; U: how far from its own place a pixel is on a straight grid.
+    pub(crate) fn waves(&self, image: &Image, displacement: Option<&Departure>) -> Vec<f64> {
+        let waves = self.harmonics.iter().map(|harmonic| {
+            let q = frame::wave(&self.wave_vectors.basis, harmonic.index);
+            (q, Complex64::from_polar(harmonic.amplitude, harmonic.phase))
+        });
+        waves::sum(image, waves, self.centre, displacement)
+    }
+
     /// Of the first shell.
     pub(crate) fn weakest_signal_to_noise(&self) -> f64 {
         let first = self.harmonics.iter().take(3);
@@ -117,6 +129,8 @@ impl LatticeFit {
         if let Some(change) = &mut self.inhomogeneity {
             change.mean /= size;
             change.noise /= size * size;
+            change.second.values /= size * size;
+            change.second.covariance /= size.powi(4);
         }
         self
     }

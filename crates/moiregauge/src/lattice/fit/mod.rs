@@ -43,6 +43,7 @@ pub(crate) mod places;
 pub(crate) mod solve;
 pub(crate) mod straight;
 pub(crate) mod tables;
+pub(crate) mod waves;
 
 pub use bend::Inhomogeneity;
 pub use closure::Closure;

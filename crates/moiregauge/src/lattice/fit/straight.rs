@@ -68,7 +68,10 @@ pub(crate) fn without_bend(fit: &mut Fit, noise: FinalNoise) -> Followed {
         bent: noise.bent,
         ..straight
     };
-    let change = fit.inhomogeneity(&straight);
+    let mut change = fit.inhomogeneity(&straight);
+    if let Some(change) = &mut change {
+        change.second.values = total.second(&fit.frame);
+    }
     // The mean of the bend is added to the waves only where the lattice is said to change.
     let is_told = change.as_ref().is_some_and(Inhomogeneity::is_significant);
     let refitted = is_told.then(|| fit.refit(&image)).flatten();

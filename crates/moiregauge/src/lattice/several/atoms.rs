@@ -13,11 +13,13 @@ use nalgebra::{Complex, DMatrix, DVector, Matrix2, Vector2};
 use crate::explain::evidence::weakest;
 use crate::frame::background::Background;
 use crate::frame::blur::blurred;
+use crate::frame::departure::Departure;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
+use crate::lattice::fit::waves::{projected, sum};
 use crate::lattice::measured::{Atoms, MeasuredLattice};
 use crate::lattice::predicted::with_evidence;
-use crate::lattice::several::together::{model, take_off};
+use crate::lattice::several::together::take_off;
 use crate::lattice::start::Start;
 use crate::numbers::three::three;
 use crate::spectrum::error::LatticeError;
@@ -81,12 +83,16 @@ impl Scene<'_> {
     pub(crate) fn moires_with_atoms(&self, layers: &[&Material]) -> Option<Vec<MeasuredLattice>> {
         let flat = levelled(self.image.clone(), self.background).ok()?;
         let first = layers.iter().find_map(|layer| self.atoms(&flat, layer))?;
+        let displacement = self.geometry.displacement();
+        let without = |image: &Image, lattice: &MeasuredLattice| {
+            without(image, lattice, displacement.as_ref())
+        };
         let rest = without(&flat, &first);
-        let moires = self.coarse(&rest, &first)?;
+        let moires = self.coarse(&rest, &first, displacement.as_ref())?;
         let mut others = moires
             .iter()
             .fold(flat.clone(), |rest, moire| without(&rest, moire));
-        let beside = satellites(&others, &first, &moires)?;
+        let beside = satellites(&others, &first, &moires, displacement.as_ref())?;
         take_off(&mut others, &beside);
         let atoms = self.again(&others, &first.reciprocal)?;
         let (atoms, _) = with_evidence(atoms, &others, self.geometry);
@@ -164,7 +170,12 @@ impl Scene<'_> {
     }
 
     /// The moirés in what is left without the atoms, found in bins of their size.
-    fn coarse(&self, rest: &Image, atoms: &MeasuredLattice) -> Option<Vec<MeasuredLattice>> {
+    fn coarse(
+        &self,
+        rest: &Image,
+        atoms: &MeasuredLattice,
+        displacement: Option<&Departure>,
+    ) -> Option<Vec<MeasuredLattice>> {
         let longest = three(&atoms.reciprocal).map(|q| std::f64::consts::TAU / q.norm());
         let bin = longest.iter().fold(1.0f64, |a, b| a.max(*b)).ceil();
         let bins = rest.binned(bin as usize);
@@ -174,7 +185,7 @@ impl Scene<'_> {
         let mut left = rest.clone();
         let mut measured = |moire: MeasuredLattice| {
             let found = self.again(&left, &(moire.reciprocal / bin)).filter(large)?;
-            left = without(&left, &found);
+            left = without(&left, &found, displacement);
             Some(found)
         };
         found.into_iter().map(&mut measured).collect()
@@ -199,10 +210,10 @@ impl Scene<'_> {
 }
 
 /// An image less the waves of a lattice.
-fn without(image: &Image, lattice: &MeasuredLattice) -> Image {
+fn without(image: &Image, lattice: &MeasuredLattice, displacement: Option<&Departure>) -> Image {
     let mut rest = image.clone();
     if let Some(fit) = &lattice.fit {
-        take_off(&mut rest, &model(fit, image));
+        take_off(&mut rest, &fit.waves(image, displacement));
     }
     rest
 }
@@ -235,6 +246,7 @@ fn satellites(
     image: &Image,
     atoms: &MeasuredLattice,
     moires: &[MeasuredLattice],
+    displacement: Option<&Departure>,
 ) -> Option<Vec<f64>> {
     let centres = three(&atoms.reciprocal);
     let shells = shells(2);
@@ -251,44 +263,20 @@ fn satellites(
     let waves: Vec<Vector2<f64>> = centres.iter().copied().chain(beside).collect();
     let n = waves.len();
     let middle = Vector2::new(image.columns as f64 - 1.0, image.rows as f64 - 1.0) / 2.0;
-    let sums = DVector::from_iterator(n, waves.iter().map(|q| projected(image, *q, &middle)));
+    let sums = waves
+        .iter()
+        .map(|q| projected(image, *q, middle, displacement));
+    let sums = DVector::from_iterator(n, sums);
     let size = [image.columns as f64, image.rows as f64];
     let gram = DMatrix::from_fn(n, n, |k, l| {
         let d = waves[l] - waves[k];
         Complex::from(dirichlet(d.x, size[0]) * dirichlet(d.y, size[1]))
     });
     let amplitudes = gram.lu().solve(&sums)? * Complex::from(2.0);
-    let mut values = vec![0.0; image.values.len()];
     // The first waves are those of the atoms themselves, which stay in the image.
-    for (q, c) in waves.iter().zip(amplitudes.iter()).skip(centres.len()) {
-        let along: Vec<Complex<f64>> = (0..image.columns)
-            .map(|column| Complex::cis(q.x * (column as f64 - middle.x)) * c)
-            .collect();
-        for (row, line) in values.chunks_exact_mut(image.columns).enumerate() {
-            let turn = Complex::cis(q.y * (row as f64 - middle.y));
-            for (value, wave) in line.iter_mut().zip(&along) {
-                *value += (wave * turn).re;
-            }
-        }
-    }
-    Some(values)
-}
-
-/// `Σ v e^{−iq·(n − middle)}`.
-fn projected(image: &Image, q: Vector2<f64>, middle: &Vector2<f64>) -> Complex<f64> {
-    let along: Vec<Complex<f64>> = (0..image.columns)
-        .map(|column| Complex::cis(-q.x * (column as f64 - middle.x)))
-        .collect();
-    let of_row = |row: usize| {
-        let turn = Complex::cis(-q.y * (row as f64 - middle.y));
-        let values = image.row(row).iter().zip(&along);
-        let sum: Complex<f64> = values
-            .filter(|(v, _)| v.is_finite())
-            .map(|(v, w)| w * *v)
-            .sum();
-        sum * turn
-    };
-    (0..image.rows).map(of_row).sum()
+    let beside = waves.into_iter().zip(amplitudes.iter().copied());
+    let beside = beside.skip(centres.len());
+    Some(sum(image, beside, middle, displacement))
 }
 
 /// `Σ e^{iq(n − (size − 1)/2)}` over the pixels of a side.

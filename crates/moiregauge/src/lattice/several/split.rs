@@ -11,6 +11,7 @@ use nalgebra::{Matrix2, Vector2};
 use rustfft::num_complex::Complex64;
 
 use crate::frame::image::Image;
+use crate::lattice::fit::waves::sum;
 
 /// Step of the grid, cycles per frame: a small part of a main lobe, ...
 const STEP: f64 = 0.25;
@@ -144,19 +145,8 @@ fn sinc(x: f64) -> f64 {
 
 fn model(image: &Image, waves: &[Wave]) -> Vec<f64> {
     let centre = Vector2::new(image.columns as f64 - 1.0, image.rows as f64 - 1.0) / 2.0;
-    let mut values = vec![0.0; image.values.len()];
-    for wave in waves {
-        let along: Vec<Complex64> = (0..image.columns)
-            .map(|c| Complex64::cis(wave.q.x * (c as f64 - centre.x)))
-            .collect();
-        for (row, line) in values.chunks_exact_mut(image.columns).enumerate() {
-            let turn = 2.0 * wave.amplitude * Complex64::cis(wave.q.y * (row as f64 - centre.y));
-            for (value, along) in line.iter_mut().zip(&along) {
-                *value += (turn * along).re;
-            }
-        }
-    }
-    values
+    let waves = waves.iter().map(|wave| (wave.q, 2.0 * wave.amplitude));
+    sum(image, waves, centre, None)
 }
 
 #[cfg(test)]

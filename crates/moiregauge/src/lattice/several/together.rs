@@ -3,6 +3,7 @@
 use nalgebra::{DMatrix, Matrix2, Matrix3, Matrix4, SMatrix, Vector2};
 
 use crate::frame::background::{Background, remove_background};
+use crate::frame::departure::Departure;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::lattice::fit::fitted::LatticeFit;
@@ -45,10 +46,12 @@ pub fn measure_several(
     background: Background,
     count: usize,
 ) -> Result<Vec<MeasuredLattice>, LatticeError> {
+    let displacement = geometry.displacement();
     let scene = Scene {
         image,
         geometry,
         background,
+        displacement: displacement.as_ref(),
     };
     let mut parts: Vec<Part> = Vec::new();
     while parts.len() < count {
@@ -70,7 +73,7 @@ pub fn measure_several(
         });
     }
     if count > 1 {
-        beside_each_other(&mut parts, image)?;
+        beside_each_other(&mut parts, image, scene.displacement)?;
     }
     Ok(parts.into_iter().map(|part| part.lattice).collect())
 }
@@ -80,6 +83,8 @@ struct Scene<'a> {
     image: &'a Image,
     geometry: &'a Geometry,
     background: Background,
+    /// How far from its own place each pixel is on a straight grid.
+    displacement: Option<&'a Departure>,
 }
 
 /// One lattice and what it makes of the image.
@@ -90,16 +95,6 @@ struct Part {
 }
 
 impl Part {
-    fn new(lattice: MeasuredLattice, image: &Image) -> Option<Self> {
-        let fit = lattice.fit.clone()?;
-        let model = model(&fit, image);
-        Some(Self {
-            lattice,
-            fit,
-            model,
-        })
-    }
-
     /// Whether its first harmonics are more than noise.
     fn is_significant(&self) -> bool {
         self.lattice.signal_to_noise > WEAKEST
@@ -130,13 +125,23 @@ impl Part {
 }
 
 impl Scene<'_> {
+    fn part(&self, lattice: MeasuredLattice) -> Option<Part> {
+        let fit = lattice.fit.clone()?;
+        let model = fit.waves(self.image, self.displacement);
+        Some(Part {
+            lattice,
+            fit,
+            model,
+        })
+    }
+
     /// Another lattice beside the known ones. Those that are still to be found are noise to it: where it does
     /// not stand out of that, what the spectrum proposes is taken on trial.
     fn next(&self, parts: &[Part]) -> Result<Part, LatticeError> {
         let left = self.without(parts, None);
         let new = |lattice: MeasuredLattice| {
             let known = |part: &Part| parts.iter().any(|other| part.is(other, self.image));
-            Part::new(lattice, self.image).filter(|part| !known(part))
+            self.part(lattice).filter(|part| !known(part))
         };
         let error = match measure_whole(&left, self.geometry, self.background, Method::Lattice) {
             Ok(lattice) => return new(lattice).ok_or(LatticeError::Entangled),
@@ -183,7 +188,7 @@ impl Scene<'_> {
             let near = |model: &[f64], pair: &Matrix2<f64>| {
                 let mut rest = left.clone();
                 take_off(&mut rest, model);
-                Part::new(self.near(&rest, pair)?, self.image)
+                self.part(self.near(&rest, pair)?)
             };
             let Some(first) = near(&b.model, &a.pair) else {
                 continue;
@@ -238,12 +243,8 @@ impl Scene<'_> {
             for i in 0..parts.len() {
                 let left = self.without(parts, Some(i));
                 let pair = parts[i].fit.wave_vectors.basis;
-                let refitted = self
-                    .near(&left, &pair)
-                    .and_then(|l| Part::new(l, self.image));
-                let Some(part) = refitted else {
-                    return Err(LatticeError::Entangled);
-                };
+                let refitted = self.near(&left, &pair).and_then(|l| self.part(l));
+                let part = refitted.ok_or(LatticeError::Entangled)?;
                 let moved = part.fit.wave_vectors.basis - pair;
                 let sigma = part.fit.wave_vectors.covariance.diagonal().map(f64::sqrt);
                 let moved = moved.iter().zip(sigma.iter());
@@ -264,28 +265,12 @@ pub(crate) fn take_off(image: &mut Image, model: &[f64]) {
     }
 }
 
-/// `Σ A cos(q·(n − centre) + φ)` on the pixels of `image`.
-pub(crate) fn model(fit: &LatticeFit, image: &Image) -> Vec<f64> {
-    let mut values = vec![0.0; image.values.len()];
-    for harmonic in &fit.harmonics {
-        let q = fit.wave_vectors.basis * Vector2::from(harmonic.index.map(f64::from));
-        let along: Vec<(f64, f64)> = (0..image.columns)
-            .map(|c| (q.x * (c as f64 - fit.centre.x)).sin_cos())
-            .collect();
-        for (row, line) in values.chunks_exact_mut(image.columns).enumerate() {
-            let angle = q.y * (row as f64 - fit.centre.y) + harmonic.phase;
-            let (sin, cos) = angle.sin_cos();
-            let (a, b) = (harmonic.amplitude * cos, harmonic.amplitude * sin);
-            for (value, (sin, cos)) in line.iter_mut().zip(&along) {
-                *value += a * cos - b * sin;
-            }
-        }
-    }
-    values
-}
-
 /// Enlarges the errors of each part by what the others take of it.
-fn beside_each_other(parts: &mut [Part], image: &Image) -> Result<(), LatticeError> {
+fn beside_each_other(
+    parts: &mut [Part],
+    image: &Image,
+    displacement: Option<&Departure>,
+) -> Result<(), LatticeError> {
     let columns: Vec<usize> = parts.iter().map(|p| derivatives(&p.fit)).collect();
     let total: usize = 1 + columns.iter().sum::<usize>();
     let shortest = parts
@@ -309,6 +294,7 @@ fn beside_each_other(parts: &mut [Part], image: &Image) -> Result<(), LatticeErr
             design[0] = 1.0;
             let mut at = 1;
             let pixel = Vector2::new(column as f64, row as f64);
+            let pixel = pixel + displacement.map_or_else(Vector2::zeros, |u| u.at(pixel));
             for part in parts.iter() {
                 at += differentiate(&part.fit, image, pixel, &mut design.as_mut_slice()[at..]);
             }
@@ -337,7 +323,7 @@ fn derivatives(fit: &LatticeFit) -> usize {
     4 + 2 * fit.harmonics.len()
 }
 
-/// Derivatives of the model at a pixel: by the phases of the first three harmonics, by `(q₁, q₂)` in units of
+/// Derivatives of the model at a place: by the phases of the first three harmonics, by `(q₁, q₂)` in units of
 /// one over the frame, by the amplitudes of the first three, and by both amplitudes of the others. Returns their number.
 fn differentiate(fit: &LatticeFit, image: &Image, pixel: Vector2<f64>, out: &mut [f64]) -> usize {
     let from_centre = pixel - fit.centre;
@@ -404,4 +390,81 @@ fn map<const N: usize>(
     let (b, a) = (b.cholesky()?.l(), a.cholesky()?.l());
     let inverse = a.solve_lower_triangular(&DMatrix::identity(N, N))?;
     Some(SMatrix::from_column_slice((b * inverse).as_slice()))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::frame::departure::{Across, Term};
+    use crate::numbers::rng::normals;
+
+    const SIZE: [usize; 2] = [150, 121];
+
+    /// Bows of up to 2 % of the frame.
+    fn bent() -> Departure {
+        let term = |along, across, x, y| Term {
+            along,
+            across: Across::Power(across),
+            size: Vector2::new(x, y),
+        };
+        let terms = vec![
+            term(2, 0, 1.9, 0.4),
+            term(1, 2, 0.3, -0.4),
+            term(0, 2, 0.7, -1.5),
+        ];
+        Departure::new(terms, [0, SIZE[0] - 1], [0, SIZE[1] - 1])
+    }
+
+    /// Two uniform lattices under a known bend come out within their errors, and neither is said to change.
+    #[test]
+    fn known_bends_are_no_change_of_either_lattice() {
+        const SEEDS: u64 = 12;
+        let pairs = [
+            Matrix2::new(0.45, -0.02, 0.21, 0.52),
+            Matrix2::new(0.33, 0.12, 0.04, 0.35),
+        ];
+        let bent = bent();
+        let geometry = Geometry {
+            pixel_to_nm: Matrix2::identity(),
+            origin: Vector2::zeros(),
+            from_sensors: true,
+            size: SIZE,
+            covariance: Matrix4::zeros(),
+            departure: Some(Arc::new(bent.clone())),
+        };
+        let mut pulls = 0.0;
+        for seed in 0..SEEDS {
+            let mut normal = normals(seed, "several on a bent grid", 0);
+            let value = |i: usize| {
+                let at = Vector2::new((i % SIZE[0]) as f64, (i / SIZE[0]) as f64);
+                let at = at + bent.at(at);
+                let of = |pair: &Matrix2<f64>| {
+                    let [a, b] = [0, 1].map(|j| pair.column(j).dot(&at));
+                    a.cos() + b.cos() + (b - a).cos()
+                };
+                of(&pairs[0]) + 0.8 * of(&pairs[1]) + 0.3 * normal()
+            };
+            let values = (0..SIZE[0] * SIZE[1]).map(value);
+            let image = Image::new(SIZE[1], SIZE[0], values.collect());
+            let found = measure_several(&image, &geometry, Background::Plane, 2).unwrap();
+            let fits = found.into_iter().map(|found| found.fit.unwrap());
+            let fits: Vec<_> = fits.collect();
+            assert!(fits.iter().all(|fit| fit.change().is_none()), "{seed}");
+            for pair in &pairs {
+                let pulls_of = |fit: &LatticeFit| {
+                    let waves = fit.wave_vectors;
+                    let name = (pair.try_inverse().unwrap() * waves.basis).map(f64::round);
+                    let miss = waves.basis - pair * name;
+                    (0..4)
+                        .map(|i| miss[i].powi(2) / waves.covariance[(i, i)])
+                        .sum::<f64>()
+                };
+                pulls += fits.iter().map(pulls_of).fold(f64::INFINITY, f64::min);
+            }
+        }
+        let rms = (pulls / (8.0 * SEEDS as f64)).sqrt();
+        assert!((0.8..1.25).contains(&rms), "{rms}");
+    }
 }
