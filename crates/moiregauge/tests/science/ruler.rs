@@ -245,6 +245,26 @@ fn maps_and_images_are_by_the_atoms() {
     }
 }
 
+/// The drift of one frame is that of the sample in true lengths, whatever the gain; what is left is the strain of the layer that is the ruler.
+#[test]
+fn the_drift_of_a_frame_has_no_gain() {
+    let (gain, drift) = (1.05, Vector2::new(0.035, 0.05));
+    // Lines of 0.05 s, ten in a second.
+    let pitch = 18.0 / 256.0;
+    let times = Vector2::new(0.05 / 255.0, 0.1) / pitch;
+    let map = Matrix2::identity() / gain - drift * times.transpose();
+    let shown = map.try_inverse().unwrap();
+    let found = analysed(&[frame(&shown, 0.5, 21)], RulerLayer::Auto);
+    let found = found.sets[0].ruler.as_ref().unwrap().drift.unwrap();
+    let slow_speed = pitch / 0.1;
+    for (found, drift) in found.iter().zip(&drift) {
+        assert!(
+            (found.value - drift).abs() < 0.0015 * slow_speed,
+            "{found:?} {drift}"
+        );
+    }
+}
+
 /// Gains and skew of the scanner at a drift that is known are those of its map, by the polar decomposition of what the atoms show.
 #[test]
 fn the_atoms_calibrate_the_scanner() {

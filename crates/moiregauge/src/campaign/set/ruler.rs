@@ -224,7 +224,7 @@ fn calibration(
 struct Scanner {
     /// What the scanner shows over what it is, along the fast axis: drift does not touch it.
     fast_gain: f64,
-    /// Along the fast and the slow axis, nm/s, if both axes have this gain and stand at a right angle.
+    /// Along the fast and the slow axis, true lengths in nm/s, if both axes have this gain and stand at a right angle.
     drift: Option<Vector2<f64>>,
     /// nm/s.
     slow_speed: f64,
@@ -237,7 +237,7 @@ impl Scanner {
         let gradient = line
             .timing
             .and_then(|timing| line.geometry.time_gradient(&timing));
-        // The map is I − v uᵀ over the gain: see heterostrain::strain::Ruler.
+        // With the gain g the map is I/g − v uᵀ: see heterostrain::strain::Ruler.
         let turn = ruler.map * fast * fast_gain;
         let turn = Matrix2::new(
             turn.dot(&fast),
@@ -245,8 +245,8 @@ impl Scanner {
             -fast.perp(&turn),
             turn.dot(&fast),
         );
-        let map = turn * ruler.map * fast_gain;
-        let velocity = |u: Vector2<f64>| (Matrix2::identity() - map) * u / u.norm_squared();
+        let still = Matrix2::identity() / fast_gain;
+        let velocity = |u: Vector2<f64>| (still - turn * ruler.map) * u / u.norm_squared();
         Self {
             fast_gain,
             drift: gradient.map(velocity),
