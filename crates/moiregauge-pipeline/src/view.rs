@@ -64,6 +64,9 @@ pub struct Overlay {
     /// The sides of the part that carries the lattice, from point to point (column, row), pixels at whole numbers; none
     /// where it is the whole image.
     pub outline_px: Vec<[[f64; 2]; 2]>,
+    /// How far from its own place a pixel is on a straight grid, columns and rows: at 9 × 9 places of the frame from edge to edge, row by row;
+    /// none of a straight grid.
+    pub displacement_px: Vec<[f64; 2]>,
     /// nm for a column and for a row.
     pub pixel_to_nm: [[f64; 2]; 2],
     /// The place of the first pixel, nm.
@@ -97,6 +100,7 @@ pub fn overlays(analysis: &Analysis, file: &str) -> Vec<Overlay> {
             spots_per_px: periods(&line.pixels.basis),
             spots_per_nm: periods(&line.sensor.basis),
             outline_px: outline.map(|side| side.map(Into::into)).collect(),
+            displacement_px: line.displacement.clone(),
             pixel_to_nm: pairs(&line.pixel_to_nm),
             origin_nm: line.origin.into(),
             excluded: scan.excluded.clone(),

@@ -8,7 +8,7 @@ import { empty, field, fill, h, s, say } from "./dom.js";
 import { total } from "./format.js";
 import { maskOf, maskPath, paint, usedOf } from "./mask.js";
 import { Marker } from "./markers.js";
-import { brightPlace, drawLattice, drawSpots, firstShell, frameSpots, nearMiddle, spotPlace, waveAt } from "./overlay.js";
+import { brightPlace, displacement, drawLattice, drawSpots, firstShell, frameSpots, nearMiddle, pixelOf, spotPlace, waveAt } from "./overlay.js";
 import { overlayOf, showScan, showSpectrum } from "./pictures.js";
 import { headline, meanOf } from "./result.js";
 import { ScanList } from "./scanlist.js";
@@ -126,7 +126,7 @@ export class CorrectView {
         this.frame();
       }
       if (file !== this.picked) return;
-      if (this.overlay && !this.overlay.origin_px) this.overlay.origin_px = brightPlace(this.image, this.overlay.lattice_px);
+      if (this.overlay && !this.overlay.origin_px) this.overlay.origin_px = brightPlace(this.image, this.overlay);
       this.place();
       this.showChoices();
       document.documentElement.dataset.correct = `${file} ${work.version}`;
@@ -242,14 +242,18 @@ export class CorrectView {
   placeVectors(lattice) {
     const o = nearMiddle(this.image, lattice);
     const vectors = /** @type {[Pair, Pair]} */ (lattice.lattice_px.map((v) => [...v]));
-    vectors.forEach((v, i) => this.markers.push(new Marker(this.image, {
-      label: `Lattice vector ${i + 1}`, kind: "vector", at: { x: o[0] + v[0], y: o[1] + v[1] },
-      moved: (to) => {
-        vectors[i] = [to.x - o[0], to.y - o[1]];
-        this.preview({ ...lattice, origin_px: o, lattice_px: vectors });
-      },
-      done: () => this.tellLattice(vectors),
-    })));
+    vectors.forEach((v, i) => {
+      const [x, y] = pixelOf(this.image, lattice, [o[0] + v[0], o[1] + v[1]]);
+      this.markers.push(new Marker(this.image, {
+        label: `Lattice vector ${i + 1}`, kind: "vector", at: { x, y },
+        moved: (to) => {
+          const off = displacement(this.image, lattice, [to.x, to.y]);
+          vectors[i] = [to.x + off[0] - o[0], to.y + off[1] - o[1]];
+          this.preview({ ...lattice, origin_px: o, lattice_px: vectors });
+        },
+        done: () => this.tellLattice(vectors),
+      }));
+    });
   }
 
   /** @param {import("./overlay.js").Overlay} lattice */

@@ -6,7 +6,7 @@ import { fill, s } from "./dom.js";
 /** @typedef {import("./viewer.js").Viewer} Viewer */
 /** @typedef {[number, number]} Pair */
 /** @typedef {{line?: string, origin_px?: Pair, lattice_px: [Pair, Pair], lattice_nm?: [Pair, Pair],
- *   outline_px?: [Pair, Pair][], grains?: {share: number, lattice_nm: number[][]}[]}} Overlay the outline is a set of sides; the origin is that of the drawing */
+ *   outline_px?: [Pair, Pair][], displacement_px?: Pair[], grains?: {share: number, lattice_nm: number[][]}[]}} Overlay the outline is a set of sides; the origin is that of the drawing */
 
 /** At most this many cells are drawn; more would hide the image. */
 const MOST = 4000;
@@ -27,6 +27,48 @@ export function drawLattice(group, viewer, overlay, options = {}) {
   if (sides) group.append(s("path", { d: sides, class: "cell-halo" }), s("path", { d: sides, class: "outline" }));
 }
 
+/**
+ * How far from its own place a pixel is on a straight grid: between the places that are known.
+ * @param {Viewer} viewer
+ * @param {Overlay} overlay
+ * @param {Pair} pixel
+ * @returns {Pair}
+ */
+export function displacement(viewer, { displacement_px: known }, [x, y]) {
+  if (!known?.length) return [0, 0];
+  const side = Math.round(Math.sqrt(known.length));
+  const along = (/** @type {number} */ at, /** @type {number} */ size) => {
+    const u = Math.max(0, Math.min(1, at / (size - 1))) * (side - 1);
+    const first = Math.min(side - 2, Math.floor(u));
+    return { first, share: u - first };
+  };
+  const [i, j] = [along(x, viewer.columns), along(y, viewer.rows)];
+  const at = (/** @type {number} */ k) => {
+    const row = (/** @type {number} */ n) => {
+      const from = n * side + i.first;
+      return known[from][k] * (1 - i.share) + known[from + 1][k] * i.share;
+    };
+    return row(j.first) * (1 - j.share) + row(j.first + 1) * j.share;
+  };
+  return [at(0), at(1)];
+}
+
+/**
+ * The pixel at which a scanner that bends was at a place of the straight grid.
+ * @param {Viewer} viewer
+ * @param {Overlay} overlay
+ * @param {Pair} straight
+ * @returns {Pair}
+ */
+export function pixelOf(viewer, overlay, straight) {
+  let pixel = straight;
+  for (let n = 0; n < 3; n++) {
+    const [u, v] = displacement(viewer, overlay, pixel);
+    pixel = [straight[0] - u, straight[1] - v];
+  }
+  return pixel;
+}
+
 /** @param {Viewer} viewer @param {number} x @param {number} y */
 function place(viewer, x, y) {
   const at = viewer.toScreen(x, y);
@@ -37,10 +79,11 @@ function place(viewer, x, y) {
  * Where circles are put: on the brightest place of the image folded into one cell. It is for the eye; nothing is
  * measured with it.
  * @param {Viewer} viewer
- * @param {[Pair, Pair]} lattice px
+ * @param {Overlay} overlay
  * @returns {Pair}
  */
-export function brightPlace(viewer, [a, b]) {
+export function brightPlace(viewer, overlay) {
+  const [a, b] = overlay.lattice_px;
   const { image, shown, step } = viewer;
   const det = a[0] * b[1] - a[1] * b[0];
   const bins = 16;
@@ -51,7 +94,9 @@ export function brightPlace(viewer, [a, b]) {
     for (let i = 0; i < image.width; i++, n++) {
       const z = shown[n];
       if (Number.isNaN(z)) continue;
-      const [x, y] = [(i + 0.5) * step - 0.5, (j + 0.5) * step - 0.5];
+      const [column, row] = [(i + 0.5) * step - 0.5, (j + 0.5) * step - 0.5];
+      const off = displacement(viewer, overlay, [column, row]);
+      const [x, y] = [column + off[0], row + off[1]];
       const u = (x * b[1] - y * b[0]) / det;
       const v = (a[0] * y - a[1] * x) / det;
       const bin = Math.floor((v - Math.floor(v)) * bins) * bins + Math.floor((u - Math.floor(u)) * bins);
@@ -110,7 +155,7 @@ function dots(viewer, overlay) {
   const reach = Math.ceil(Math.hypot(viewer.columns, viewer.rows) * Math.max(Math.hypot(...a), Math.hypot(...b)) / area) + 1;
   for (let m = -reach; m <= reach; m++) {
     for (let n = -reach; n <= reach; n++) {
-      const [x, y] = [o[0] + m * a[0] + n * b[0], o[1] + m * a[1] + n * b[1]];
+      const [x, y] = pixelOf(viewer, overlay, [o[0] + m * a[0] + n * b[0], o[1] + m * a[1] + n * b[1]]);
       if (x < -0.5 || y < -0.5 || x > viewer.columns - 0.5 || y > viewer.rows - 0.5) continue;
       const at = viewer.toScreen(x, y);
       if (at.x < -20 || at.y < -20 || at.x > viewer.stage.clientWidth + 20 || at.y > viewer.stage.clientHeight + 20) continue;
@@ -124,8 +169,9 @@ function dots(viewer, overlay) {
 function cell(viewer, overlay) {
   const o = nearMiddle(viewer, overlay);
   const [a, b] = overlay.lattice_px;
+  /** @type {Pair[]} */
   const corners = [o, [o[0] + a[0], o[1] + a[1]], [o[0] + a[0] + b[0], o[1] + a[1] + b[1]], [o[0] + b[0], o[1] + b[1]]];
-  const points = corners.map(([x, y]) => place(viewer, x, y)).join(" ");
+  const points = corners.map((corner) => place(viewer, ...pixelOf(viewer, overlay, corner))).join(" ");
   return [s("polygon", { points, class: "cell-halo" }), s("polygon", { points, class: "cell" })];
 }
 

@@ -39,7 +39,7 @@ export async function showScan(viewer, file, channelName, overlay) {
   const { from, to } = histogram(shown);
   viewer.setLook({ low: from, high: to, colours: localStorage.getItem("colours") ?? "viridis" });
   viewer.show(image, { step, shown, full: { columns: about.columns, rows: about.rows } });
-  if (overlay?.lattice_px && !overlay.origin_px) overlay.origin_px = brightPlace(viewer, overlay.lattice_px);
+  if (overlay?.lattice_px && !overlay.origin_px) overlay.origin_px = brightPlace(viewer, overlay);
   return channel;
 }
 

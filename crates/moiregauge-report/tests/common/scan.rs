@@ -116,6 +116,7 @@ pub(super) fn scan(
         shortcut_wavelengths: Some([12.46, 12.52, 12.61]),
         pixel_to_nm: frame,
         origin: Vector2::new(10.0 + creep, -20.0),
+        displacement: Vec::new(),
         from_sensors: true,
         periods: 4.5,
         signal_to_noise: 11.0,

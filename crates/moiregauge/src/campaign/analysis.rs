@@ -392,6 +392,9 @@ pub struct LineAnalysis {
     pub pixel_to_nm: Matrix2<f64>,
     /// Position of pixel (0, 0), nm.
     pub origin: Vector2<f64>,
+    /// How far from its own place a pixel is on a straight grid, columns and rows: at 9 × 9 places of the frame from edge to edge, row by row;
+    /// empty of a straight grid.
+    pub displacement: Vec<[f64; 2]>,
     /// Whether position sensors were used.
     pub from_sensors: bool,
     /// Number of lattice periods across the shorter side of the frame.

@@ -6,6 +6,9 @@
 
 use nalgebra::{DMatrix, Matrix2, Matrix2xX, Matrix4, Vector2};
 
+/// A departure is drawn by this number of places along each side of a frame.
+const PLACES: usize = 9;
+
 /// A function across the lines, of v from −1 to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Across {
@@ -245,15 +248,24 @@ impl Departure {
 
     /// How far it goes, and its largest change from column to column, over some hundred places of a frame of such a size.
     pub(crate) fn largest(&self, size: [usize; 2]) -> (f64, f64) {
-        const PLACES: usize = 10;
+        const STEPS: usize = 10;
         let (mut far, mut stretch) = (0.0f64, 0.0f64);
-        for i in 0..=PLACES * (PLACES + 2) {
-            let share = [i % (PLACES + 1), i / (PLACES + 1)];
-            let at = [0, 1].map(|k| (size[k] - 1) as f64 * share[k] as f64 / PLACES as f64);
+        for i in 0..=STEPS * (STEPS + 2) {
+            let share = [i % (STEPS + 1), i / (STEPS + 1)];
+            let at = [0, 1].map(|k| (size[k] - 1) as f64 * share[k] as f64 / STEPS as f64);
             far = far.max(self.at(Vector2::from(at)).norm());
             stretch = stretch.max(self.slopes(Vector2::from(at)).column(0).norm());
         }
         (far, stretch)
+    }
+
+    /// Its values at [`PLACES`] × [`PLACES`] places of a frame of such a size, from edge to edge, row by row.
+    pub(crate) fn drawn(&self, size: [usize; 2]) -> Vec<[f64; 2]> {
+        let side = |n: usize, i: usize| (n as f64 - 1.0) * i as f64 / (PLACES - 1) as f64;
+        let at = |i: usize| Vector2::new(side(size[0], i % PLACES), side(size[1], i / PLACES));
+        (0..PLACES * PLACES)
+            .map(|i| self.at(at(i)).into())
+            .collect()
     }
 
     /// The mean of its slopes under a Gaussian window of such widths (standard deviations) about a place, over the pixels of a frame
@@ -265,14 +277,14 @@ impl Departure {
         size: [usize; 2],
     ) -> Matrix2<f64> {
         /// Places along each axis, in widths, and their weights: exact for slopes up to the fifth degree (Gauss–Hermite).
-        const PLACES: [[f64; 2]; 3] = [
+        const NODES: [[f64; 2]; 3] = [
             [-1.732_050_807_568_877_2, 1.0],
             [0.0, 4.0],
             [1.732_050_807_568_877_2, 1.0],
         ];
         let (mut sum, mut weights) = (Matrix2::zeros(), 0.0);
-        for [x, along] in PLACES {
-            for [y, across] in PLACES {
+        for [x, along] in NODES {
+            for [y, across] in NODES {
                 let at = place + Vector2::new(x, y).component_mul(&widths);
                 let inside = |axis: usize| at[axis] >= 0.0 && at[axis] <= size[axis] as f64 - 1.0;
                 if inside(0) && inside(1) {

@@ -278,6 +278,8 @@ fn measure_line(
     })?;
     let cell = |lattice: &MeasuredLattice| lattice.pixels.basis.determinant().abs();
     lattices.sort_by(|a, b| cell(b).total_cmp(&cell(a)));
+    let displacement = geometry.displacement();
+    let displacement = displacement.map(|off| off.drawn(geometry.size));
     let lines = lattices.into_iter().map(|lattice| {
         about_lattice(file, &lattice, &geometry, caveats);
         MeasuredLine {
@@ -296,6 +298,7 @@ fn measure_line(
             speeds,
             pitch_sigma: pitch,
             speed_error,
+            displacement: displacement.clone().unwrap_or_default(),
             pixels: pixels.clone(),
         }
     });

@@ -84,6 +84,9 @@ pub struct MeasuredLine {
     /// Relative standard error of the mean speeds.
     #[serde(with = "exact")]
     pub speed_error: [f64; 2],
+    /// As [`LineAnalysis`](crate::campaign::LineAnalysis) has it.
+    #[serde(skip)]
+    pub(crate) displacement: Vec<[f64; 2]>,
     /// To know the whole image again.
     pub(crate) pixels: Fingerprint,
 }

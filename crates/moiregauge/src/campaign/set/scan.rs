@@ -119,6 +119,7 @@ fn line_analysis(
         shortcut_wavelengths: line.lattice.shortcut_wavelengths,
         pixel_to_nm: line.geometry.pixel_to_nm,
         origin: line.geometry.origin,
+        displacement: line.displacement.clone(),
         from_sensors: line.geometry.from_sensors,
         periods: line.lattice.periods,
         signal_to_noise: line.lattice.signal_to_noise,
