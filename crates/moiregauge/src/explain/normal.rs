@@ -18,6 +18,11 @@ const TINY: f64 = 1e-9;
 const GROUND: usize = 6;
 /// Steps of the fit of wave vectors.
 const STEPS: usize = 5;
+/// Bins along a line over which waves are stepped: ratios of third order are off by the rounding of phases, and so is a phase by its cube.
+const STRETCH: usize = 32;
+/// Rows whose products are added to a Gram matrix at once, and columns: what fits into registers.
+const ROWS: usize = 8;
+const LANES: usize = 4;
 /// Largest change of a phase at the ends of the frame in one step, rad.
 const LONGEST_STEP: f64 = 1.0;
 
@@ -122,31 +127,56 @@ impl Phases {
             .unwrap_or(0) as i32;
         let mut waves = vec![Complex64::default(); indices.len() + self.others.len()];
         let mut powers = vec![[Complex64::default(); 2]; 2 * most as usize + 1];
-        for (i, block) in scene.block.iter().enumerate() {
-            let Some(block) = *block else { continue };
-            let unit = scene.unit(i);
+        powers[most as usize] = [Complex64::ONE; 2];
+        let own = (0..2).map(|j| self.pair.column(j).into_owned());
+        let own: Vec<Vector2<f64>> = own
+            .filter(|_| most > 0)
+            .chain(self.others.clone())
+            .collect();
+        let straight = self.bend.is_empty();
+        let place = |unit: Vector2<f64>| {
             let at = unit.component_mul(&scene.half);
-            let at = match self.bend.len() {
-                0 => at,
-                _ => at + self.displacement(unit),
-            };
-            let phases = self.pair.transpose() * at;
-            for j in (0..2).filter(|_| most > 0) {
-                let first = Complex64::cis(phases[j]);
-                powers[most as usize][j] = Complex64::new(1.0, 0.0);
-                for n in 1..=most as usize {
-                    let next = powers[most as usize + n - 1][j] * first;
-                    powers[most as usize + n][j] = next;
-                    powers[most as usize - n][j] = next.conj();
+            if straight {
+                at
+            } else {
+                at + self.displacement(unit)
+            }
+        };
+        let mut stepped = vec![Stepped::default(); own.len()];
+        for (i, block) in scene.block.iter().enumerate() {
+            if i % scene.columns % STRETCH == 0 {
+                let end = scene.columns - i % scene.columns;
+                let ahead = &scene.block[i..][..end.min(STRETCH)];
+                if ahead.iter().any(Option::is_some) {
+                    let places =
+                        [0, 1, 2, 3].map(|n| place(scene.unit(i) + scene.step() * n as f64));
+                    for (stepped, q) in stepped.iter_mut().zip(&own) {
+                        *stepped = Stepped::new(places.map(|at| q.dot(&at)));
+                    }
                 }
             }
-            for (wave, [h, k]) in waves.iter_mut().zip(indices) {
-                *wave = powers[(most + h) as usize][0] * powers[(most + k) as usize][1];
+            if let Some(block) = *block {
+                for (j, first) in stepped
+                    .iter()
+                    .take(if most > 0 { 2 } else { 0 })
+                    .enumerate()
+                {
+                    for n in 1..=most as usize {
+                        let next = powers[most as usize + n - 1][j] * first.value();
+                        powers[most as usize + n][j] = next;
+                        powers[most as usize - n][j] = next.conj();
+                    }
+                }
+                for (wave, [h, k]) in waves.iter_mut().zip(indices) {
+                    *wave = powers[(most + h) as usize][0] * powers[(most + k) as usize][1];
+                }
+                let others = &stepped[own.len() - self.others.len()..];
+                for (wave, other) in waves[indices.len()..].iter_mut().zip(others) {
+                    *wave = other.value();
+                }
+                each(i, block, scene.unit(i), &waves);
             }
-            for (wave, q) in waves[indices.len()..].iter_mut().zip(&self.others) {
-                *wave = Complex64::cis(q.dot(&at));
-            }
-            each(i, block, unit, &waves);
+            stepped.iter_mut().for_each(Stepped::step);
         }
     }
 
@@ -175,7 +205,7 @@ impl Phases {
         self.bend.resize(bends, [0.0; 2]);
         let linear = 2 * (indices.len() + self.others.len()) + GROUND;
         for _ in 0..STEPS {
-            let (weights, rest) = self.rest(scene, indices)?;
+            let weights = self.weights(scene, indices)?;
             let size = linear + 2 * (2 + bends + self.others.len());
             let (mut sums, mut row) = (Sums::new(1, size), vec![0.0; size]);
             self.for_each(scene, indices, |i, _, unit, waves| {
@@ -197,7 +227,9 @@ impl Phases {
                         - weights[2 * wave] * row[2 * wave + 1];
                     (row[at], row[at + 1]) = (slope * unit.x, slope * unit.y);
                 }
-                sums.add(0, &row, rest[i]);
+                let fitted = row[..linear].iter().zip(weights.iter());
+                let rest = scene.values[i] - fitted.map(|(a, b)| a * b).sum::<f64>();
+                sums.add(0, &row, rest);
             });
             let step = amplitudes(&sums.normals()[0], TINY)?;
             let step = step.rows(linear, size - linear).into_owned();
@@ -236,19 +268,25 @@ impl Phases {
         ]);
     }
 
-    /// Amplitudes of cosine and sine of all waves and of a quadratic background, and what they leave of each bin.
-    pub(crate) fn rest(
-        &self,
-        scene: &Scene,
-        indices: &[[i32; 2]],
-    ) -> Option<(DVector<f64>, Vec<f64>)> {
+    /// Amplitudes of cosine and sine of all waves and of a quadratic background.
+    fn weights(&self, scene: &Scene, indices: &[[i32; 2]]) -> Option<DVector<f64>> {
         let n = 2 * (indices.len() + self.others.len()) + GROUND;
         let (mut sums, mut row) = (Sums::new(1, n), vec![0.0; n]);
         self.for_each(scene, indices, |i, _, unit, waves| {
             Self::row(unit, waves, &mut row);
             sums.add(0, &row, scene.values[i]);
         });
-        let weights = amplitudes(&sums.normals()[0], TINY)?;
+        amplitudes(&sums.normals()[0], TINY)
+    }
+
+    /// These amplitudes, and what they leave of each bin.
+    pub(crate) fn rest(
+        &self,
+        scene: &Scene,
+        indices: &[[i32; 2]],
+    ) -> Option<(DVector<f64>, Vec<f64>)> {
+        let weights = self.weights(scene, indices)?;
+        let mut row = vec![0.0; weights.len()];
         let mut rest = vec![0.0; scene.values.len()];
         self.for_each(scene, indices, |i, _, unit, waves| {
             Self::row(unit, waves, &mut row);
@@ -289,20 +327,57 @@ impl Phases {
     }
 }
 
+/// A wave along a line whose phase is a cubic polynomial: the value and its ratios of first, second and third order from bin to bin.
+#[derive(Clone, Copy, Default)]
+struct Stepped([Complex64; 4]);
+
+impl Stepped {
+    /// From the phases of the first four bins.
+    fn new([a, b, c, d]: [f64; 4]) -> Self {
+        let differences = [a, b - a, c - 2.0 * b + a, d - 3.0 * c + 3.0 * b - a];
+        Self(differences.map(Complex64::cis))
+    }
+
+    fn value(&self) -> Complex64 {
+        self.0[0]
+    }
+
+    fn step(&mut self) {
+        let [value, first, second, third] = self.0;
+        self.0 = [value * first, first * second, second * third, third];
+    }
+}
+
+/// Some rows and columns of a Gram matrix.
+type Tile = [[f64; LANES]; LANES];
+
+/// The place of a tile among those of the lower triangle, row by row.
+fn tile(row: usize, column: usize) -> usize {
+    row * (row + 1) / 2 + column
+}
+
 /// Sums of products, block by block.
 pub(crate) struct Sums {
     size: usize,
-    /// Lower triangles of the Gram matrices, row by row.
-    grams: Vec<Vec<f64>>,
+    /// Lower triangles of the Gram matrices, in tiles.
+    grams: Vec<Vec<Tile>>,
     moments: Vec<Vec<f64>>,
+    /// Rows that are not in the Gram matrix of their block yet, lanes by lanes, and their number.
+    pending: Vec<[[f64; LANES]; ROWS]>,
+    count: usize,
+    block: usize,
 }
 
 impl Sums {
     pub(crate) fn new(blocks: usize, size: usize) -> Self {
+        let lanes = size.div_ceil(LANES);
         Self {
             size,
-            grams: vec![vec![0.0; size * size]; blocks],
+            grams: vec![vec![[[0.0; LANES]; LANES]; tile(lanes, 0)]; blocks],
             moments: vec![vec![0.0; size]; blocks],
+            pending: vec![[[0.0; LANES]; ROWS]; lanes],
+            count: 0,
+            block: 0,
         }
     }
 
@@ -314,26 +389,55 @@ impl Sums {
 
     /// Adds the products of a row with itself and with a value.
     pub(crate) fn add(&mut self, block: usize, row: &[f64], value: f64) {
-        let n = self.size;
         self.add_moment(block, row, value);
-        let gram = &mut self.grams[block];
+        if self.count == ROWS || self.block != block {
+            self.flush();
+            self.block = block;
+        }
+        for (lanes, values) in self.pending.iter_mut().zip(row.chunks(LANES)) {
+            lanes[self.count][..values.len()].copy_from_slice(values);
+        }
+        self.count += 1;
+    }
+
+    /// Adds the products of the pending rows.
+    fn flush(&mut self) {
+        let (pending, count) = (&mut self.pending, self.count);
+        let left = pending.iter_mut().flat_map(|lanes| &mut lanes[count..]);
+        left.for_each(|row| *row = [0.0; LANES]);
+        self.count = 0;
+        let (gram, pending) = (&mut self.grams[self.block], &self.pending);
         widest(
             #[inline(always)]
             || {
-                for (i, a) in row.iter().enumerate() {
-                    for (sum, b) in gram[i * n..=i * n + i].iter_mut().zip(row) {
-                        *sum += a * b;
+                for (i, own) in pending.iter().enumerate() {
+                    let tiles = &mut gram[tile(i, 0)..=tile(i, i)];
+                    for (sums, others) in tiles.iter_mut().zip(pending) {
+                        let mut all = *sums;
+                        for (own, others) in own.iter().zip(others) {
+                            for (sums, a) in all.iter_mut().zip(own) {
+                                for (sum, b) in sums.iter_mut().zip(others) {
+                                    *sum += a * b;
+                                }
+                            }
+                        }
+                        *sums = all;
                     }
                 }
             },
         );
     }
 
-    pub(crate) fn normals(self) -> Vec<Normal> {
+    pub(crate) fn normals(mut self) -> Vec<Normal> {
+        self.flush();
+        let size = self.size;
         let both = self.grams.into_iter().zip(self.moments);
         both.map(|(lower, moment)| {
-            let mut gram = DMatrix::from_row_slice(self.size, self.size, &lower);
-            gram.fill_upper_triangle_with_lower_triangle();
+            let value = |i: usize, j: usize| {
+                let (i, j) = (i.max(j), i.min(j));
+                lower[tile(i / LANES, j / LANES)][i % LANES][j % LANES]
+            };
+            let gram = DMatrix::from_fn(size, size, value);
             let moment = DVector::from_vec(moment);
             Normal { gram, moment }
         })
@@ -387,4 +491,46 @@ pub(crate) fn gains(normals: &[Normal], kept: &[usize]) -> Option<Vec<f64>> {
         }
     }
     Some(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::image::Image;
+
+    /// Waves that are stepped along lines are those of the phases at each bin, where pixels are missing, too; products of rows are added whatever their
+    /// number and order.
+    #[test]
+    fn waves_are_those_of_their_phases() {
+        let (columns, rows) = (201, 7);
+        let there = |i: usize| if i % 11 < 8 { 1.0 } else { f64::NAN };
+        let values = (0..columns * rows).map(there).collect();
+        let scene = Scene::of(&Image::new(rows, columns, values)).unwrap();
+        let mut phases = Phases::straight(Matrix2::new(0.9, -0.2, 0.3, 0.8));
+        phases.bend = (0..CUBIC)
+            .map(|t| [0.7 - 0.3 * t as f64, 0.2 * t as f64])
+            .collect();
+        phases.others = vec![Vector2::new(0.4, -1.1)];
+        let indices = shells(2);
+        let (mut direct, mut value) = (Vec::new(), 0.0);
+        phases.for_each(&scene, indices, |i, block, unit, waves| {
+            assert_eq!(Some(block), scene.block[i]);
+            let at = unit.component_mul(&scene.half) + phases.displacement(unit);
+            let lattice = indices
+                .iter()
+                .map(|index| phases.pair * Vector2::from(index.map(f64::from)));
+            let all = lattice.chain(phases.others.clone());
+            let mut row = Vec::new();
+            for (q, wave) in all.zip(waves) {
+                assert!((Complex64::cis(q.dot(&at)) - wave).norm() < 1e-8, "{i}");
+                row.extend([wave.re, wave.im]);
+            }
+            value += row[0] * row[5];
+            direct.push(block);
+        });
+        assert_eq!(direct.len(), scene.block.iter().flatten().count());
+        let total = total(&phases.normals(&scene, indices));
+        assert!((total.gram[(0, 5)] - value).abs() < 1e-9 * value.abs().max(1.0));
+        assert_eq!(total.gram, total.gram.transpose());
+    }
 }

@@ -128,6 +128,11 @@ impl Scene {
         (place - self.middle).component_div(&self.half)
     }
 
+    /// From a bin to the next one along a line.
+    pub(crate) fn step(&self) -> Vector2<f64> {
+        Vector2::new(1.0 / self.half.x, 0.0)
+    }
+
     /// The turn in which each block is held out: neighbours in different ones.
     pub(crate) fn fold(block: usize) -> usize {
         (block % BLOCKS + 2 * (block / BLOCKS)) % FOLDS
