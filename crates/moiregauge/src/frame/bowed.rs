@@ -18,6 +18,7 @@ use crate::frame::departure::{Across, legendre};
 use crate::frame::image::Image;
 use crate::frame::line_steps::correlated;
 use crate::frame::plane::PlaneFit;
+use crate::numbers::dot::dot;
 
 /// Largest degrees along a line and across the lines: such a sum follows a creep or a hysteresis to a thousandth.
 const DEGREES: [usize; 2] = [8, 8];
@@ -58,9 +59,15 @@ pub(crate) fn departure(image: &Image, plane: &PlaneFit, used: &Range<usize>) ->
     if lines.len() < 2 * BLOCKS {
         return Vec::new();
     }
+    let all: Vec<Across> = (0..=DEGREES[1]).map(Across::Power).collect();
+    let design = design(&lines, &all);
+    let of_block = |b| design.rows_range(block(&lines, b));
+    let normals: Vec<_> = (0..BLOCKS)
+        .map(|b| of_block(b).tr_mul(&of_block(b)))
+        .collect();
     let span = (plane.per_column * image.columns as f64).hypot(plane.per_row * image.rows as f64);
     let found: Vec<(f64, Described)> = (0..=DEGREES[0])
-        .filter_map(|along| of_degree(&lines, along, HARMLESS * span))
+        .filter_map(|along| of_degree(&lines, &normals, along, HARMLESS * span))
         .collect();
     if found.iter().all(|(gain, _)| *gain < BEYOND_CHANCE) {
         return Vec::new();
@@ -93,18 +100,20 @@ fn lines(image: &Image, plane: &PlaneFit, used: &Range<usize>) -> Vec<Line> {
     let Some(whole) = normal(&|_| true) else {
         return Vec::new();
     };
+    let polynomials: Vec<Vec<f64>> = (0..degrees)
+        .map(|degree| along.iter().map(|all| all[degree]).collect())
+        .collect();
     let mut lines = Vec::with_capacity(image.rows);
     for row in 0..image.rows {
         let values = &image.row(row)[used.clone()];
-        let mut right = DVector::<f64>::zeros(degrees);
-        let mut count = 0;
-        for (c, value) in values.iter().enumerate().filter(|(_, v)| v.is_finite()) {
-            let left = value - plane.at((used.start + c) as f64, row as f64);
-            count += 1;
-            for (sum, p) in right.iter_mut().zip(&along[c]) {
-                *sum += left * p;
-            }
-        }
+        let count = values.iter().filter(|v| v.is_finite()).count();
+        let beside = |(c, value): (usize, &f64)| match value.is_finite() {
+            true => value - plane.at((used.start + c) as f64, row as f64),
+            false => 0.0,
+        };
+        let left: Vec<f64> = values.iter().enumerate().map(beside).collect();
+        let right = polynomials.iter().map(|p| dot(p, &left));
+        let right = DVector::from_iterator(degrees, right);
         let sizes = if count == values.len() {
             Some(whole.solve(&right))
         } else if 2 * count > values.len() {
@@ -136,11 +145,16 @@ struct Tried {
 
 /// How one degree along the lines runs across them, and by how much that predicts lines better than the plane. What may be chance is
 /// left to the plane.
-fn of_degree(lines: &[Line], along: usize, least: f64) -> Option<(f64, Described)> {
+fn of_degree(
+    lines: &[Line],
+    normals: &[DMatrix<f64>],
+    along: usize,
+    least: f64,
+) -> Option<(f64, Described)> {
     let values = DVector::from_iterator(lines.len(), lines.iter().map(|l| l.sizes[along]));
     let powers = |n: usize| (0..n).map(Across::Power).collect::<Vec<_>>();
     let tried = |across: Vec<Across>, share: f64| {
-        let left = held_out(lines, &values, &across)?;
+        let left = held_out(lines, normals, &values, &across)?;
         Some(Tried {
             across,
             left,
@@ -284,23 +298,45 @@ fn solved(normal: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
     Some(normal.clone().cholesky()?.solve(right))
 }
 
-/// Sum of the squares of what each block of lines has beside what the other blocks predict of it.
-fn held_out(lines: &[Line], values: &DVector<f64>, across: &[Across]) -> Option<f64> {
-    let block = |b: usize| b * lines.len() / BLOCKS..(b + 1) * lines.len() / BLOCKS;
+/// A block of lines.
+fn block(lines: &[Line], b: usize) -> Range<usize> {
+    b * lines.len() / BLOCKS..(b + 1) * lines.len() / BLOCKS
+}
+
+/// Sum of the squares of what each block of lines has beside what the other blocks predict of it. `normals`: the products of all powers in each block.
+fn held_out(
+    lines: &[Line],
+    normals: &[DMatrix<f64>],
+    values: &DVector<f64>,
+    across: &[Across],
+) -> Option<f64> {
     if across.is_empty() {
         return Some(values.norm_squared());
     }
     let design = design(lines, across);
-    let (normal, right) = (design.tr_mul(&design), design.tr_mul(values));
-    (0..BLOCKS)
-        .map(|b| {
-            let part = design.rows_range(block(b));
-            let own = values.rows_range(block(b));
-            let rest = &normal - part.tr_mul(&part);
-            let sizes = solved(&rest, &(&right - part.tr_mul(&own)))?;
-            Some((own - part * sizes).norm_squared())
-        })
-        .sum()
+    let parts = (0..BLOCKS).map(|b| {
+        (
+            design.rows_range(block(lines, b)),
+            values.rows_range(block(lines, b)),
+        )
+    });
+    let parts: Vec<_> = parts.collect();
+    let n = across.len();
+    let known = across.iter().all(|f| matches!(f, Across::Power(_)));
+    let normal = |b: usize| match known {
+        true => normals[b].view((0, 0), (n, n)).into_owned(),
+        false => parts[b].0.tr_mul(&parts[b].0),
+    };
+    let own: Vec<_> = (0..BLOCKS)
+        .map(|b| (normal(b), parts[b].0.tr_mul(&parts[b].1)))
+        .collect();
+    let normal: DMatrix<f64> = own.iter().map(|(normal, _)| normal).sum();
+    let right: DVector<f64> = own.iter().map(|(_, right)| right).sum();
+    let left = parts.iter().zip(&own).map(|((part, values), own)| {
+        let sizes = solved(&(&normal - &own.0), &(&right - &own.1))?;
+        Some((values - part * sizes).norm_squared())
+    });
+    left.sum()
 }
 
 #[cfg(test)]
