@@ -31,6 +31,7 @@ __all__ = [
     "Conventions",
     "Coordinates",
     "Crop",
+    "Curvature",
     "DeviceResult",
     "DislocationResult",
     "DomainsResult",
@@ -478,6 +479,16 @@ class Crop(Document):
     """Number of rows."""
     top: int
     """First row, from the top."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Curvature(Document):
+    """How position sensors bend: second derivatives of what they show against where the scanner is."""
+
+    covariance: tuple[tuple[float, float, float, float, float, float], tuple[float, float, float, float, float, float], tuple[float, float, float, float, float, float], tuple[float, float, float, float, float, float], tuple[float, float, float, float, float, float], tuple[float, float, float, float, float, float]]
+    """Their covariance."""
+    per_um: tuple[float, float, float, float, float, float]
+    """Of x by (xx, xy, yy), then of y, per µm."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -1448,6 +1459,8 @@ class ScannerCalibration(Document):
     """Whether it is that of position sensors."""
     covariance: tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
     """Covariance of the three, in their units."""
+    curvature: Curvature | None = None
+    """How position sensors bend; `None` where no bend was seen."""
     gain_percent: float
     """s: by how much lengths in the image are too long, mean of x and y, per cent."""
     line_rates_hz: tuple[float, ...]
@@ -2047,6 +2060,10 @@ decoded_by(
         },
         Conventions: {},
         Crop: {},
+        Curvature: {
+            "covariance": several(several(float, 6), 6),
+            "per_um": several(float, 6),
+        },
         DeviceResult: {
             "angle_deg": float,
             "area": RegionResult.from_dict,
@@ -2366,6 +2383,7 @@ decoded_by(
         },
         ScannerCalibration: {
             "covariance": several(several(float, 3), 3),
+            "curvature": Curvature.from_dict,
             "gain_percent": float,
             "line_rates_hz": several(float),
             "mismatch_percent": float,
