@@ -17,10 +17,9 @@ use heterostrain::lattice::Lattice;
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 use spmfile::{FrameDirection, LineDirection};
 
-use crate::calibration::{
-    Calibration, Coordinates, Curvature, KnownLattice, Shown, curvature, shown,
-};
+use crate::calibration::{Calibration, Coordinates, Curvature, KnownLattice, Shown, shown};
 use crate::campaign::alike::{Alike, alike};
+use crate::campaign::curvature;
 use crate::campaign::group::{Group, groups};
 use crate::campaign::identity::once;
 use crate::caveat::calibrating::CalibrationDoubt;

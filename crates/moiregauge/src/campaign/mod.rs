@@ -9,6 +9,7 @@ pub(crate) mod analysis;
 pub(crate) mod atomic;
 pub(crate) mod calibrate;
 pub(crate) mod combine;
+pub(crate) mod curvature;
 pub(crate) mod grains;
 pub(crate) mod group;
 pub(crate) mod identity;
