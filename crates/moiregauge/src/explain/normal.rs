@@ -144,12 +144,12 @@ impl Phases {
         };
         let mut stepped = vec![Stepped::default(); own.len()];
         for (i, block) in scene.block.iter().enumerate() {
-            if i % scene.columns % STRETCH == 0 {
+            if (i % scene.columns).is_multiple_of(STRETCH) {
                 let end = scene.columns - i % scene.columns;
                 let ahead = &scene.block[i..][..end.min(STRETCH)];
                 if ahead.iter().any(Option::is_some) {
                     let places =
-                        [0, 1, 2, 3].map(|n| place(scene.unit(i) + scene.step() * n as f64));
+                        [0.0, 1.0, 2.0, 3.0].map(|n| place(scene.unit(i) + scene.step() * n));
                     for (stepped, q) in stepped.iter_mut().zip(&own) {
                         *stepped = Stepped::new(places.map(|at| q.dot(&at)));
                     }

@@ -107,9 +107,12 @@ fn lines(image: &Image, plane: &PlaneFit, used: &Range<usize>) -> Vec<Line> {
     for row in 0..image.rows {
         let values = &image.row(row)[used.clone()];
         let count = values.iter().filter(|v| v.is_finite()).count();
-        let beside = |(c, value): (usize, &f64)| match value.is_finite() {
-            true => value - plane.at((used.start + c) as f64, row as f64),
-            false => 0.0,
+        let beside = |(c, value): (usize, &f64)| {
+            if value.is_finite() {
+                value - plane.at((used.start + c) as f64, row as f64)
+            } else {
+                0.0
+            }
         };
         let left: Vec<f64> = values.iter().enumerate().map(beside).collect();
         let right = polynomials.iter().map(|p| dot(p, &left));
@@ -323,9 +326,12 @@ fn held_out(
     let parts: Vec<_> = parts.collect();
     let n = across.len();
     let known = across.iter().all(|f| matches!(f, Across::Power(_)));
-    let normal = |b: usize| match known {
-        true => normals[b].view((0, 0), (n, n)).into_owned(),
-        false => parts[b].0.tr_mul(&parts[b].0),
+    let normal = |b: usize| {
+        if known {
+            normals[b].view((0, 0), (n, n)).into_owned()
+        } else {
+            parts[b].0.tr_mul(&parts[b].0)
+        }
     };
     let own: Vec<_> = (0..BLOCKS)
         .map(|b| (normal(b), parts[b].0.tr_mul(&parts[b].1)))

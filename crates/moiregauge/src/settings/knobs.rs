@@ -227,9 +227,10 @@ impl Settings {
     /// The shares of their ranges by which x and y may be bent: what a calibration of the sensors leaves, or what is assumed.
     pub(crate) fn bends(&self, bends: &Bends) -> Vector2<f64> {
         let assumed = &self.calibration;
-        let percent = match bends.from_sensors {
-            true => assumed.sensor_bend_percent,
-            false => assumed.scanner_bend_percent,
+        let percent = if bends.from_sensors {
+            assumed.sensor_bend_percent
+        } else {
+            assumed.scanner_bend_percent
         };
         let measured = self.scanner.as_ref().filter(|_| bends.from_sensors);
         measured

@@ -514,8 +514,8 @@ fn sensors_that_bend_are_calibrated() {
         assert_eq!(of(false).curvature, None, "{seed}");
         let found = of(true);
         let curvature = found.curvature.clone().unwrap();
-        for i in 0..6 {
-            pulls.push((curvature.per_um[i] - BENT[i]) / curvature.covariance[i][i].sqrt());
+        for (i, bent) in BENT.iter().enumerate() {
+            pulls.push((curvature.per_um[i] - bent) / curvature.covariance[i][i].sqrt());
         }
         told = Some(found);
     }
