@@ -470,7 +470,7 @@ fn bent(scan: &mut Scan, about: [f64; 2]) {
     }
 }
 
-/// Frames of atoms tell how sensors bend; with it a uniform moiré is none that changes.
+/// Frames of atoms tell how sensors bend; with it a uniform moiré is not said to change.
 #[test]
 fn sensors_that_bend_are_calibrated() {
     let with_sensors = |mut set: Simulation| {
