@@ -19,7 +19,7 @@ pub(crate) fn seen(line: &MeasuredLine) -> Option<Seen> {
     let by_nm = second_derivatives(&j.try_inverse()?);
     let of_places: Matrix6<f64> = Matrix2::identity().kronecker(&by_nm);
     let map: Matrix6<f64> = of_phases.kronecker(&by_nm);
-    let (values, noise) = (bend.second.values, bend.second.covariance);
+    let (values, noise) = (bend.second.values.cast(), bend.second.covariance.cast());
     let of_sensors = noise_of_sensors(&line.geometry);
     let covariance = map * noise * map.transpose() + of_places * of_sensors * of_places.transpose();
     Some((map * values, covariance))

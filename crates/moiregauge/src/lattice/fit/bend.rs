@@ -66,13 +66,13 @@ pub struct Inhomogeneity {
     pub(crate) second: SecondOrder,
 }
 
-/// Second derivatives of the phases by the pixel.
+/// Second derivatives of the phases by the pixel, in single precision: each line of every frame keeps them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct SecondOrder {
     /// Of ψ₁ by (xx, xy, yy), then of ψ₂, rad.
-    pub(crate) values: Vector6<f64>,
+    pub(crate) values: Vector6<f32>,
     /// What noise makes of them.
-    pub(crate) covariance: Matrix6<f64>,
+    pub(crate) covariance: Matrix6<f32>,
 }
 
 /// Where fewer residuals than this share are cut off, three times what Gaussian noise has, the fit follows a lattice that bends, and
@@ -221,8 +221,10 @@ pub(crate) fn inhomogeneity(
     let second = |i: usize, j: usize| spread[(second_order()[i], second_order()[j])];
     let inhomogeneity = Inhomogeneity {
         second: SecondOrder {
-            values: Vector6::from_fn(|i, _| bend[second_order()[i]] * derivatives[i]),
-            covariance: Matrix6::from_fn(|i, j| second(i, j) * derivatives[i] * derivatives[j]),
+            values: Vector6::from_fn(|i, _| (bend[second_order()[i]] * derivatives[i]) as f32),
+            covariance: Matrix6::from_fn(|i, j| {
+                (second(i, j) * derivatives[i] * derivatives[j]) as f32
+            }),
         },
         wavelength,
         angle,

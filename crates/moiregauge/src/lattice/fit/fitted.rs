@@ -129,8 +129,9 @@ impl LatticeFit {
         if let Some(change) = &mut self.inhomogeneity {
             change.mean /= size;
             change.noise /= size * size;
-            change.second.values /= size * size;
-            change.second.covariance /= size.powi(4);
+            let area = (size * size) as f32;
+            change.second.values /= area;
+            change.second.covariance /= area * area;
         }
         self
     }

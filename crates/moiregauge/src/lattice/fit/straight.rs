@@ -70,7 +70,7 @@ pub(crate) fn without_bend(fit: &mut Fit, noise: FinalNoise) -> Followed {
     };
     let mut change = fit.inhomogeneity(&straight);
     if let Some(change) = &mut change {
-        change.second.values = total.second(&fit.frame);
+        change.second.values = total.second(&fit.frame).cast();
     }
     // The mean of the bend is added to the waves only where the lattice is said to change.
     let is_told = change.as_ref().is_some_and(Inhomogeneity::is_significant);
