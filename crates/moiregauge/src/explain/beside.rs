@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::explain::cells::BETTER;
 use crate::explain::evidence::Blocks;
-use crate::explain::normal::{Phases, gains};
+use crate::explain::normal::gains;
+use crate::explain::phases::Phases;
 use crate::explain::scene::Scene;
 use crate::frame::image::Image;
 use crate::numbers::exact;

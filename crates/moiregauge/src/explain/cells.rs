@@ -11,7 +11,8 @@ use rayon::prelude::*;
 
 use crate::explain::beside::strongest_near;
 use crate::explain::evidence::{Blocks, gain, weakest};
-use crate::explain::normal::{Phases, gains};
+use crate::explain::normal::gains;
+use crate::explain::phases::Phases;
 use crate::explain::scene::Scene;
 use crate::frame::image::Image;
 use crate::numbers::three::three;

@@ -2,7 +2,8 @@
 
 use nalgebra::Matrix2;
 
-use crate::explain::normal::{Normal, Phases, RIDGE, gains};
+use crate::explain::normal::{Normal, RIDGE, gains};
+use crate::explain::phases::Phases;
 use crate::explain::scene::Scene;
 use crate::frame::background::{Background, remove_background};
 use crate::frame::image::Image;

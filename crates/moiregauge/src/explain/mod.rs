@@ -11,6 +11,7 @@ pub(crate) mod beside;
 pub(crate) mod cells;
 pub(crate) mod evidence;
 pub(crate) mod normal;
+pub(crate) mod phases;
 pub(crate) mod scene;
 pub(crate) mod table;
 pub(crate) mod waves;

@@ -3,7 +3,8 @@
 use nalgebra::{Matrix2, Vector2};
 
 use crate::explain::evidence::{Blocks, weakest_family};
-use crate::explain::normal::{Phases, gains};
+use crate::explain::normal::gains;
+use crate::explain::phases::Phases;
 use crate::explain::scene::Scene;
 use crate::frame::image::Image;
 use crate::spectrum::shells::{FIRST_SHELL, shells};
