@@ -96,5 +96,7 @@ pub fn ruler_from(
     }
     // Its errors are those at the size of the scans.
     calibration.sizes_nm.clear();
+    // A drift that changes bends a small frame as well, and would bend a large one by the square of their sizes.
+    calibration.curvature = None;
     Ok(calibration)
 }

@@ -193,11 +193,6 @@ pub fn calibrate(
         line_rates_hz,
         ..Calibration::new(&values, &covariance, coordinates)
     };
-    if calibration.curvature.is_some() {
-        let is_bend =
-            |c: &Caveat| matches!(&c.doubt, Doubt::Lattice(LatticeDoubt::Inhomogeneous { .. }));
-        caveats.retain(|caveat| !is_bend(caveat));
-    }
     about_plausibility(&calibration, covariance_known, &mut caveats);
     let map = calibration
         .map()
