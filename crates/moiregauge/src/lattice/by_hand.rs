@@ -91,7 +91,7 @@ pub(crate) fn measure_by_hand(
         return start.measure(method);
     }
     // Ground that is stronger than its waves hides it.
-    let find = |even: &Arc<Image>| {
+    let find = |even: &Arc<Image>, _| {
         let is_meant = |pair: &Matrix2<f64>| meant.is_near(pair, geometry);
         let first = meant.first(geometry);
         let start = Start::find_meant(even, geometry, background, first, &is_meant)?;

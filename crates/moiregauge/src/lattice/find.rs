@@ -7,7 +7,7 @@ use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::lattice::beside::without_waves;
 use crate::lattice::ground::below;
-use crate::lattice::measure::{measure_clipped, measure_levelled};
+use crate::lattice::measure::{measure_clipped, measure_evened, measure_levelled};
 use crate::lattice::measured::MeasuredLattice;
 use crate::lattice::predicted::{LEAST, best_predicted, judged};
 use crate::spectrum::error::LatticeError;
@@ -45,8 +45,7 @@ pub(crate) fn measure_own(
     if method != Method::Lattice {
         return measure_levelled(&image, geometry, background, method);
     }
-    let by_peaks = |image: &Arc<Image>| {
-        let found = measure_levelled(image, geometry, background, Method::Lattice)?;
+    let freed = |image: &Arc<Image>, found: MeasuredLattice| {
         let freed = without_waves(image, &found, geometry, background);
         let freed = freed.and_then(|freed| judged(freed, image, geometry, background).ok());
         freed.map_or_else(|| judged(found, image, geometry, background), Ok)
@@ -64,11 +63,17 @@ pub(crate) fn measure_own(
         let predicts = found.evidence.as_ref().and_then(|e| e.predicts);
         predicts.is_some_and(|least| least > 2.0 * LEAST)
     };
-    let by_peaks_below = |even: &Arc<Image>| by_peaks(even).ok().filter(surely);
-    by_peaks(&image).or_else(|error| {
-        clipped()
-            .or_else(|| below(&image, geometry, background, &by_peaks_below))
-            .or_else(by_prediction)
-            .ok_or(error)
-    })
+    let by_peaks_below = |even: &Arc<Image>, side| {
+        let found = measure_evened(even, geometry, background, side).ok()?;
+        freed(even, found).ok().filter(surely)
+    };
+    let found = measure_levelled(&image, geometry, background, method);
+    found
+        .and_then(|found| freed(&image, found))
+        .or_else(|error| {
+            clipped()
+                .or_else(|| below(&image, geometry, background, &by_peaks_below))
+                .or_else(by_prediction)
+                .ok_or(error)
+        })
 }

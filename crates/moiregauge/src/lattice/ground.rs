@@ -38,12 +38,12 @@ const WIDEST: f64 = 0.5;
 const ROUNDS: usize = 2;
 
 /// The lattice of an image without its background, if it shows one beside spikes, ground and line offsets that are taken off. `find`: the lattice of an
-/// even image.
+/// even image, by the side of the window, pixels.
 pub(crate) fn below(
     image: &Image,
     geometry: &Geometry,
     background: Background,
-    find: &dyn Fn(&Arc<Image>) -> Option<MeasuredLattice>,
+    find: &dyn Fn(&Arc<Image>, f64) -> Option<MeasuredLattice>,
 ) -> Option<MeasuredLattice> {
     let shorter = image.columns.min(image.rows) as f64;
     let calm = without_spikes(image);
@@ -55,7 +55,7 @@ pub(crate) fn below(
         interrupt::check();
         let even = cut_off(&without(calm, &running_median(calm, side as usize)));
         let signs = signs(&even);
-        let mut found = find(&Arc::new(turned(&even, &signs)))?;
+        let mut found = find(&Arc::new(turned(&even, &signs)), side)?;
         found.ground = Some(side);
         // A fit to the pixels knows neither grains nor the mean of a lattice that changes.
         let plain = found.change.is_none() && found.grains.is_empty();

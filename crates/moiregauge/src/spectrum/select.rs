@@ -6,6 +6,7 @@
 //! cell, small distortion).
 
 use std::cell::OnceCell;
+use std::f64::consts::TAU;
 
 use heterostrain::lattice::{distortion, shortest_pair};
 use nalgebra::{Matrix2, Vector2};
@@ -140,7 +141,7 @@ pub(crate) fn by_score(
 /// rad per pixel → cycles per frame.
 pub(crate) fn frame_cycles(spectrum: &Spectrum) -> Matrix2<f64> {
     let [w, h] = spectrum.image_size;
-    Matrix2::from_diagonal(&Vector2::new(w as f64, h as f64)) / std::f64::consts::TAU
+    Matrix2::from_diagonal(&Vector2::new(w as f64, h as f64)) / TAU
 }
 
 /// Labels the pair canonically, refines it with the peaks it explains, and scores it.
@@ -301,10 +302,7 @@ pub(crate) fn spectrum_peaks(spectrum: &Spectrum) -> Vec<Peak> {
             );
             let q = bin.component_mul(&step);
             let cycles = frame * q;
-            if cycles.norm() < LOWEST_CYCLES
-                || q.amax() > std::f64::consts::TAU * HIGHEST_FREQUENCY
-                || q.amin() < -std::f64::consts::TAU * HIGHEST_FREQUENCY
-            {
+            if cycles.norm() < LOWEST_CYCLES || q.norm() > TAU * HIGHEST_FREQUENCY {
                 continue;
             }
             found.push(Peak {

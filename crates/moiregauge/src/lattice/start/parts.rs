@@ -14,18 +14,8 @@ use crate::frame::image::Image;
 use crate::lattice::start::{FEWEST_CELLS, HANN, Start, evidence};
 
 impl Start {
-    /// Looks for the lattices of parts of the frame, that near `first` among them, and takes the one with the most
-    /// evidence.
-    pub(crate) fn find_patch(
-        image: &Image,
-        geometry: &Geometry,
-        background: Background,
-        first: Option<Matrix2<f64>>,
-    ) -> Option<Self> {
-        Self::find_meant(image, geometry, background, first, &|_| true)
-    }
-
-    /// The same among those lattices that are meant. Where much of the frame is missing the lattice is one of a part.
+    /// Looks for the lattices of parts of the frame, that near `first` among them, of those that are meant, and takes the one with the most
+    /// evidence. Where much of the frame is missing the lattice is one of a part.
     pub(crate) fn find_meant(
         image: &Image,
         geometry: &Geometry,
