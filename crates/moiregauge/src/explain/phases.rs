@@ -192,8 +192,8 @@ impl Phases {
     ) -> Option<Self> {
         self.bend.resize(bends, [0.0; 2]);
         let linear = 2 * (indices.len() + self.others.len()) + GROUND;
+        let mut weights = self.weights(scene, indices)?;
         for _ in 0..STEPS {
-            let weights = self.weights(scene, indices)?;
             let size = linear + 2 * (2 + bends + self.others.len());
             let (mut sums, mut row) = (Sums::new(1, size), vec![0.0; size]);
             self.for_each(scene, indices, |i, _, unit, waves| {
@@ -219,9 +219,11 @@ impl Phases {
                 let rest = scene.values[i] - fitted.map(|(a, b)| a * b).sum::<f64>();
                 sums.add(0, &row, rest);
             });
-            let step = amplitudes(&sums.normals()[0], TINY)?;
-            let step = step.rows(linear, size - linear).into_owned();
-            let step = &step * (LONGEST_STEP / step.amax().max(1e-12)).min(1.0);
+            let all = amplitudes(&sums.normals()[0], TINY)?;
+            let step = all.rows(linear, size - linear).into_owned();
+            let part = (LONGEST_STEP / step.amax().max(1e-12)).min(1.0);
+            weights += all.rows(0, linear) * part;
+            let step = step * part;
             for j in 0..2 {
                 self.pair[(0, j)] += step[j] / scene.half.x;
                 self.pair[(1, j)] += step[2 + j] / scene.half.y;
