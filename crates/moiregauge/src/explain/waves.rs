@@ -52,6 +52,15 @@ impl WithWaves {
         })
     }
 
+    /// The lattice, in all of the image.
+    pub(crate) fn lattice(&self) -> Part<'static> {
+        Part {
+            pair: self.phases.pair,
+            bends: false,
+            holds: Box::new(|_| true),
+        }
+    }
+
     /// The image without the waves beside the lattice.
     pub(crate) fn taken_off(&self, image: &Image) -> Option<Image> {
         let (scene, indices) = (Scene::of(image)?, shells(3));

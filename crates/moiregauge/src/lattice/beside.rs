@@ -40,6 +40,9 @@ pub(crate) fn without_waves(
     let best = all.max_by(|a, b| a.weakest.total_cmp(&b.weakest))?;
     (best.weakest > BETTER).then_some(())?;
     let rest = Arc::new(best.taken_off(image)?);
+    let straight = best.lattice();
+    // Skirts of a lattice that ends count as waves, and are no better than an end.
+    (better_with_waves(image, &rest, &[straight], &parts(found))? > 0.0).then_some(())?;
     let mut other = measure_levelled(&rest, geometry, background, Method::Lattice).ok()?;
     // The waves that are taken off may be those of a larger cell.
     for (larger, before) in other.larger.iter_mut().zip(found.larger) {
