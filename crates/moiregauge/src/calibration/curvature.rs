@@ -4,7 +4,7 @@
 //! of a range R is `K = 0.008/R` anywhere in it.
 
 use heterostrain::Estimate;
-use nalgebra::{Matrix2, Matrix6, Vector2, Vector6};
+use nalgebra::{Matrix2, Matrix6, Matrix6x2, Vector2, Vector6};
 use serde::{Deserialize, Serialize};
 
 use crate::frame::departure::{Across, Departure, Term};
@@ -26,25 +26,83 @@ pub struct Curvature {
     pub covariance: [[f64; 6]; 6],
 }
 
-/// What one image shows: per nm, and the covariance.
-pub(crate) type Seen = (Vector6<f64>, Matrix6<f64>);
+/// What an image of a uniform lattice shows.
+pub(crate) struct Seen {
+    /// Second derivatives, per nm.
+    pub(crate) values: Vector6<f64>,
+    pub(crate) covariance: Matrix6<f64>,
+    /// What an acceleration of the sample (nm/s²) adds to them: `w = ½ a t²` with `t = u·r`.
+    pub(crate) by_acceleration: Matrix6x2<f64>,
+}
+
+/// What the images of one set show, with one acceleration of its drift (nm/s²) and the covariance of that.
+pub(crate) struct SeenBySet {
+    pub(crate) images: Vec<Seen>,
+    pub(crate) acceleration: (Vector2<f64>, Matrix2<f64>),
+}
+
+/// Normal equations of curvature and acceleration.
+struct Normal {
+    own: Matrix6<f64>,
+    mixed: Matrix6x2<f64>,
+    other: Matrix2<f64>,
+    right: (Vector6<f64>, Vector2<f64>),
+}
+
+impl SeenBySet {
+    fn normal(&self) -> Option<Normal> {
+        let (before, covariance) = self.acceleration;
+        let known = covariance.try_inverse()?;
+        let mut sums = Normal {
+            own: Matrix6::zeros(),
+            mixed: Matrix6x2::zeros(),
+            other: known,
+            right: (Vector6::zeros(), known * before),
+        };
+        for image in &self.images {
+            let weight = image.covariance.try_inverse()?;
+            let lever = image.by_acceleration;
+            sums.own += weight;
+            sums.mixed += weight * lever;
+            sums.other += lever.transpose() * weight * lever;
+            sums.right.0 += weight * image.values;
+            sums.right.1 += lever.transpose() * weight * image.values;
+        }
+        Some(sums)
+    }
+
+    /// χ² for a curvature and the acceleration that fits it best.
+    fn chi2(&self, curvature: &Vector6<f64>) -> Option<f64> {
+        let normal = self.normal()?;
+        let free = normal.right.1 - normal.mixed.transpose() * curvature;
+        let acceleration = normal.other.try_inverse()? * free;
+        let of_image = |image: &Seen| {
+            let miss = image.values - curvature - image.by_acceleration * acceleration;
+            Some((miss.transpose() * image.covariance.try_inverse()? * miss)[0])
+        };
+        let (before, covariance) = self.acceleration;
+        let miss = acceleration - before;
+        let of_acceleration = (miss.transpose() * covariance.try_inverse()? * miss)[0];
+        let images: Option<f64> = self.images.iter().map(of_image).sum();
+        Some(images? + of_acceleration)
+    }
+}
 
 impl Curvature {
-    /// The mean of what images show, with errors that hold their scatter; `None` where it may be chance.
-    pub(crate) fn of(all: &[Seen]) -> Option<Self> {
+    /// The mean of what sets show, with errors that hold their scatter and what the drift may have done; `None` where it may be chance.
+    pub(crate) fn of(sets: &[SeenBySet]) -> Option<Self> {
         let (mut weights, mut weighted) = (Matrix6::zeros(), Vector6::zeros());
-        for (values, covariance) in all {
-            let weight = covariance.try_inverse()?;
-            weights += weight;
-            weighted += weight * values;
+        for set in sets {
+            let sums = set.normal()?;
+            let back = sums.mixed * sums.other.try_inverse()?;
+            weights += sums.own - back * sums.mixed.transpose();
+            weighted += sums.right.0 - back * sums.right.1;
         }
         let covariance = weights.try_inverse()?;
         let values = covariance * weighted;
-        let chi2 = all.iter().filter_map(|(one, covariance)| {
-            let miss = one - values;
-            Some((miss.transpose() * covariance.try_inverse()? * miss)[0])
-        });
-        let covariance = covariance * enlargement(chi2.sum(), 6 * (all.len() - 1));
+        let chi2: Option<f64> = sets.iter().map(|set| set.chi2(&values)).sum();
+        let images: usize = sets.iter().map(|set| set.images.len()).sum();
+        let covariance = covariance * enlargement(chi2?, 6 * (images - 1));
         let against_none = (values.transpose() * covariance.try_inverse()? * values)[0];
         (against_none > CHANCE).then(|| Self {
             per_um: (values * PER_UM).into(),

@@ -17,9 +17,10 @@ use heterostrain::lattice::Lattice;
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 use spmfile::{FrameDirection, LineDirection};
 
+use crate::calibration::curvature::SeenBySet;
 use crate::calibration::{Calibration, Coordinates, Curvature, KnownLattice, Shown, shown};
 use crate::campaign::alike::{Alike, alike};
-use crate::campaign::curvature;
+use crate::campaign::curvature::seen_by_set;
 use crate::campaign::group::{Group, groups};
 use crate::campaign::identity::once;
 use crate::caveat::calibrating::CalibrationDoubt;
@@ -130,6 +131,8 @@ pub enum CalibrateError {
 /// One set on the way.
 struct Seen {
     group: Group,
+    /// One for each line.
+    observations: Vec<Observation>,
     lattice: Lattice,
     /// With the prior of the drift where it is needed.
     found: Shown,
@@ -181,12 +184,14 @@ pub fn calibrate(
     let covariance = covariance * scale + size * size.transpose();
     let covariance_known = sets.iter().filter(|s| used(s)).all(|s| s.known);
     let in_units = Calibration::new(&values, &statistical, coordinates).estimates();
-    let lines = sets.iter().filter(|s| used(s));
-    let lines = lines.flat_map(|s| &s.group.scans).flat_map(|s| &s.lines);
-    let bends: Vec<_> = match coordinates {
-        Coordinates::Sensors => lines.filter_map(curvature::seen).collect(),
-        Coordinates::Nominal => Vec::new(),
-    };
+    let of_sensors = |s: &&Seen| used(s) && coordinates == Coordinates::Sensors;
+    let bends: Vec<SeenBySet> = (sets.iter().filter(of_sensors))
+        .map(|s| {
+            let unknown = Matrix2::identity() * drift_sigma * drift_sigma;
+            let drift = s.drift.unwrap_or((Vector2::zeros(), unknown));
+            seen_by_set(&s.group.scans, &s.observations, &drift)
+        })
+        .collect();
     let calibration = Calibration {
         curvature: Curvature::of(&bends),
         sizes_nm,
@@ -270,16 +275,17 @@ fn see(
             found,
             drift: Some((solution.velocity, solution.covariance * scale)),
             known: true,
+            observations,
             group,
         });
     }
-    with_prior(group, &observations, cell, drift_sigma, caveats)
+    with_prior(group, observations, cell, drift_sigma, caveats)
 }
 
 /// The lattice of a set whose frames do not tell the drift, with the prior of the drift.
 fn with_prior(
     group: Group,
-    observations: &[Observation],
+    observations: Vec<Observation>,
     cell: &Matrix2<f64>,
     drift_sigma: f64,
     caveats: &mut Vec<Caveat>,
@@ -328,6 +334,7 @@ fn with_prior(
         bare: shown(&bare, cell).ok_or_else(unusable)?,
         drift: None,
         known,
+        observations,
         group,
     })
 }

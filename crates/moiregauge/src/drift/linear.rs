@@ -1,7 +1,10 @@
 //! Lattice and drift as one linear least-squares problem.
 
 use heterostrain::lattice::{Lattice, both};
-use nalgebra::{DMatrix, Matrix2, Matrix4, Matrix4x2, Matrix6, Vector2, Vector4, Vector6};
+use nalgebra::{
+    DMatrix, Matrix2, Matrix4, Matrix4x2, Matrix4x6, Matrix6, SMatrix, SVector, Vector2, Vector4,
+    Vector6,
+};
 
 use crate::drift::shares::weighted_mean;
 
@@ -78,6 +81,23 @@ impl Observation {
             m[(2 + i, i)] = t[1];
         }
         m
+    }
+
+    /// How `(R₁, R₂, D)` make the four components.
+    fn design(&self) -> Matrix4x6<f64> {
+        let mut design = Matrix4x6::identity();
+        design.fixed_columns_mut::<2>(4).copy_from(&self.elapsed());
+        design
+    }
+
+    /// The same with a velocity that changes at a constant rate, by the `age` of the image (s).
+    pub(crate) fn design_with_acceleration(&self, age: f64) -> SMatrix<f64, 4, 8> {
+        let mut design = SMatrix::<f64, 4, 8>::identity();
+        design.fixed_columns_mut::<2>(4).copy_from(&self.elapsed());
+        design
+            .fixed_columns_mut::<2>(6)
+            .copy_from(&(self.elapsed() * age));
+        design
     }
 
     /// The lattice as it would be without the drift `velocity ± covariance`: `(I − D uᵀ) r`.
@@ -182,34 +202,31 @@ pub(crate) fn least_squares(
     observations: &[Observation],
     weights: &[Matrix4<f64>],
 ) -> Option<(Vector6<f64>, Matrix6<f64>)> {
-    let mut normal = Matrix6::<f64>::zeros();
-    let mut right = Vector6::<f64>::zeros();
-    for (observation, w) in observations.iter().zip(weights) {
-        let elapsed = observation.elapsed();
-        let (wt, wr) = (w * elapsed, w * observation.lattice.flat());
-        let mut add =
-            |r: usize, c: usize, block: &dyn Fn(usize, usize) -> f64, n: usize, m: usize| {
-                for i in 0..n {
-                    for j in 0..m {
-                        normal[(r + i, c + j)] += block(i, j);
-                    }
-                }
-            };
-        let twt = elapsed.transpose() * wt;
-        add(0, 0, &|i, j| w[(i, j)], 4, 4);
-        add(0, 4, &|i, j| wt[(i, j)], 4, 2);
-        add(4, 0, &|i, j| wt[(j, i)], 2, 4);
-        add(4, 4, &|i, j| twt[(i, j)], 2, 2);
-        let tr = elapsed.transpose() * wr;
-        right += Vector6::new(wr[0], wr[1], wr[2], wr[3], tr[0], tr[1]);
+    let rows = observations.iter().zip(weights);
+    let rows = rows.map(|(o, w)| (o.design(), o.lattice.flat(), *w));
+    weighted(rows, Matrix6::zeros())
+}
+
+/// Least squares of (design, values, weight) with the information that is `known` before; the solution and its covariance.
+pub(crate) fn weighted<const N: usize>(
+    rows: impl Iterator<Item = (SMatrix<f64, 4, N>, Vector4<f64>, Matrix4<f64>)>,
+    known: SMatrix<f64, N, N>,
+) -> Option<(SVector<f64, N>, SMatrix<f64, N, N>)> {
+    let (mut normal, mut right) = (known, SVector::<f64, N>::zeros());
+    for (design, values, weight) in rows {
+        let weighted = design.transpose() * weight;
+        normal += weighted * design;
+        right += weighted * values;
     }
     // Seconds and nanometres differ by orders of magnitude: scale before inverting.
-    let scale = normal
-        .diagonal()
-        .map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 1.0 });
-    let scaled = Matrix6::from_fn(|i, j| normal[(i, j)] * scale[i] * scale[j]);
+    let size = |i: usize| normal[(i, i)];
+    let scale = SVector::<f64, N>::from_fn(|i, _| match size(i) {
+        d if d > 0.0 => 1.0 / d.sqrt(),
+        _ => 1.0,
+    });
+    let scaled = SMatrix::<f64, N, N>::from_fn(|i, j| normal[(i, j)] * scale[i] * scale[j]);
     let inverse = scaled.cholesky()?.inverse();
-    let covariance = Matrix6::from_fn(|i, j| inverse[(i, j)] * scale[i] * scale[j]);
+    let covariance = SMatrix::<f64, N, N>::from_fn(|i, j| inverse[(i, j)] * scale[i] * scale[j]);
     Some((covariance * right, covariance))
 }
 
