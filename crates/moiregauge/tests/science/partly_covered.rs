@@ -47,7 +47,7 @@ fn twist(sample: &str, seed: u64) -> Option<(f64, f64, Vec<f64>)> {
     ))
 }
 
-/// Root mean square of the pulls, how many draws gave an answer, and the largest pull.
+/// Sum of the squared pulls, how many draws gave an answer, and the largest pull.
 fn pulls(sample: &str, draws: u64) -> (f64, usize, f64) {
     let found = (1..=draws).filter_map(|seed| twist(sample, seed));
     let pulls: Vec<f64> = found
@@ -56,29 +56,35 @@ fn pulls(sample: &str, draws: u64) -> (f64, usize, f64) {
             off.fold(f64::INFINITY, f64::min) / sigma
         })
         .collect();
-    let squares: f64 = pulls.iter().map(|p| p * p).sum();
+    let squares = pulls.iter().map(|p| p * p).sum();
     let largest = pulls.iter().copied().fold(0.0, f64::max);
-    ((squares / pulls.len() as f64).sqrt(), pulls.len(), largest)
+    (squares, pulls.len(), largest)
 }
 
-/// Errors that cover have a mean square pull of 1, that of ten draws below 2.9.
+/// Errors that cover have a mean square pull of 1, over the draws of all samples.
 #[test]
 fn errors_of_partly_covered_frames_cover() {
-    for sample in ["edge", "fade", "hole", "island:share=0.35"] {
-        let draws = draws(10);
-        let (rms, answers, largest) = pulls(sample, draws.into());
-        println!("{sample}: {answers} answers, rms pull {rms:.2}, largest {largest:.1}");
-        assert!(10 * answers >= 9 * draws as usize, "{sample}: {answers}");
-        let most = *mean_square(draws).end();
-        assert!(rms * rms < most, "{sample}: {rms}");
+    let samples = ["edge", "fade", "hole", "island:share=0.35"];
+    let draws = draws(5);
+    let (mut all, mut answered) = (0.0, 0);
+    for sample in samples {
+        let (squares, answers, largest) = pulls(sample, draws.into());
+        println!("{sample}: {answers} answers, squared pulls {squares:.2}, largest {largest:.1}");
+        all += squares;
+        answered += answers;
     }
+    let count = draws as usize * samples.len();
+    assert!(10 * answered >= 9 * count, "{answered} of {count}");
+    let mean = all / answered as f64;
+    assert!(mean < *mean_square(count as u32).end(), "{mean}");
 }
 
 /// Rough ground is in all frames alike: the mean of four is hardly better for it than one. χ² of 16 draws is below 39 but for once in a
 /// thousand: an rms pull of 1.56. As if it were noise of each frame it would be twice that.
 #[test]
 fn ground_that_all_frames_show_does_not_average_out() {
-    let (rms, answers, largest) = pulls("terrain:rms=1.5", 16);
+    let (squares, answers, largest) = pulls("terrain:rms=1.5", 16);
+    let rms = (squares / answers as f64).sqrt();
     println!("{answers} answers, rms pull {rms:.2}, largest {largest:.1}");
     assert!(answers >= 15, "{answers}");
     assert!((0.5..1.56).contains(&rms), "{rms}");
