@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::explain::cells::BETTER;
 use crate::explain::evidence::Blocks;
-use crate::explain::normal::gains;
+use crate::explain::normal::{gains, total};
 use crate::explain::phases::Phases;
 use crate::explain::scene::Scene;
 use crate::frame::image::Image;
@@ -77,22 +77,27 @@ pub(crate) fn wave_beside(image: &Image, pair: &Matrix2<f64>, bends: bool) -> Op
             break;
         }
     }
-    let beside = waves.into_iter().filter_map(|q| {
-        let mut with = lattice.clone();
-        with.others = vec![strongest_near(&scene, &lattice, &rest, q)];
-        let normals = with.normals(&scene, indices);
-        let all: Vec<usize> = (0..2 * indices.len() + 2).collect();
-        let gain = gains(&normals, &all)?;
-        let without = gains(&normals, &all[..2 * indices.len()])?;
-        let amplitudes = Phases::amplitudes(&normals)?;
-        let first = FIRST_SHELL.iter().filter_map(|index| {
+    let near = waves.into_iter();
+    let near = near.map(|q| strongest_near(&scene, &lattice, &rest, q));
+    let mut with = lattice.clone();
+    with.others = near.collect();
+    let normals = with.normals(&scene, indices);
+    let all = total(&normals);
+    let own: Vec<usize> = (0..2 * indices.len()).collect();
+    let without = gains(&normals, &own)?;
+    let beside = with.others.iter().enumerate().filter_map(|(j, q)| {
+        let first = 2 * (indices.len() + j);
+        let kept = [&own[..], &[first, first + 1]].concat();
+        let amplitudes = Phases::amplitudes(&all.part(&kept))?;
+        let lattice = FIRST_SHELL.iter().filter_map(|index| {
             let at = indices.iter().position(|other| other == index)?;
             Some(amplitudes[at])
         });
         Some(WaveBeside {
-            wave_vector: with.others[0] / scene.binning as f64,
-            strength: amplitudes[indices.len()] / first.fold(f64::INFINITY, f64::min),
-            predicts: Blocks::difference(&scene, &gain, &without).standard_errors(),
+            wave_vector: q / scene.binning as f64,
+            strength: amplitudes[indices.len()] / lattice.fold(f64::INFINITY, f64::min),
+            predicts: Blocks::difference(&scene, &gains(&normals, &kept)?, &without)
+                .standard_errors(),
         })
     });
     let best = beside.max_by(|a, b| a.predicts.total_cmp(&b.predicts))?;
@@ -108,20 +113,25 @@ impl Scene {
         strong: &Matrix2<f64>,
         indices: &[[i32; 2]],
     ) -> Self {
-        if let Some((_, taken)) = self.waves_beside(pair, Some(strong), indices) {
-            let values = self.values.iter_mut().zip(taken);
-            values.for_each(|(value, taken)| *value -= taken);
-        }
+        let taken = || {
+            let (waves, rest) = self.waves_beside(pair, Some(strong), indices)?;
+            let left = waves.fitted(&rest, &[], 0)?.residual(&rest, &[])?;
+            let both = rest.values.iter().zip(left);
+            Some(both.map(|(all, left)| all - left).collect())
+        };
+        let taken: Option<Vec<f64>> = taken();
+        let values = self.values.iter_mut().zip(taken.into_iter().flatten());
+        values.for_each(|(value, taken)| *value -= taken);
         self
     }
 
-    /// The same waves, and their sum; `strong`: `None` for harmonics without skirts.
+    /// The same waves, roughly, and the image without the lattice; `strong`: `None` for harmonics without skirts.
     pub(crate) fn waves_beside(
         &self,
         pair: &Matrix2<f64>,
         strong: Option<&Matrix2<f64>>,
         indices: &[[i32; 2]],
-    ) -> Option<(Phases, Vec<f64>)> {
+    ) -> Option<(Phases, Self)> {
         let wave = |[h, k]: &[i32; 2]| pair * Vector2::new(f64::from(*h), f64::from(*k));
         let all = self.powers(&self.values);
         let power_at = |q: Vector2<f64>| {
@@ -165,20 +175,18 @@ impl Scene {
             values,
             ..self.clone()
         };
-        let (mut waves, mut left) = (lattice, rest.values.clone());
+        // Each alone in what those before leave.
+        let (mut waves, mut left) = (lattice, rest.clone());
         while waves.others.len() < MOST
-            && let Some(wave) = strongest(&self.powers(&left))
+            && let Some(wave) = strongest(&self.powers(&left.values))
         {
-            waves.others.push(wave);
-            let fitted = waves.clone().fitted(&rest, &[], 0);
-            let Some(without) = fitted.as_ref().and_then(|f| f.residual(&rest, &[])) else {
-                break;
-            };
-            left = without;
-            waves = fitted.unwrap_or(waves);
+            let mut alone = Phases::straight(*pair);
+            alone.others.push(wave);
+            let fitted = alone.fitted(&left, &[], 0)?;
+            waves.others.extend(fitted.others);
+            left.values = waves.residual(&rest, &[])?;
         }
-        let taken = rest.values.iter().zip(&left).map(|(all, left)| all - left);
-        Some((waves, taken.collect()))
+        Some((waves, rest))
     }
 
     /// Distance of a wave vector from the nearest point of a lattice (reciprocal pair, rad per bin, and its inverse), cycles per frame.
@@ -250,26 +258,23 @@ pub(crate) fn strongest_near(
     q: Vector2<f64>,
 ) -> Vector2<f64> {
     let step = scene.half.map(|half| TAU / (2.0 * half)) * (REACH / 5.0);
-    let rows = values.len() / scene.columns;
     let values = lattice.unbent(scene, values, q);
-    let power = |q: &Vector2<f64>| {
-        let mut sum = Complex64::default();
-        let (turn_re, turn_im) = (q.x.cos(), q.x.sin());
-        for row in 0..rows {
-            let start = q.y * (row as f64 - scene.middle.y) - q.x * scene.middle.x;
-            let (mut c, mut s) = (start.cos(), start.sin());
-            for value in &values[row * scene.columns..(row + 1) * scene.columns] {
-                sum += value * Complex64::new(c, -s);
-                (c, s) = (c * turn_re - s * turn_im, s * turn_re + c * turn_im);
-            }
-        }
-        sum.norm_sqr()
-    };
-    let grid =
-        (-5..=5).flat_map(|i| (-5..=5).map(move |j| Vector2::new(f64::from(i), f64::from(j))));
-    let near = grid.map(|at| q + at.component_mul(&step));
-    let best = near
-        .map(|q| (power(&q), q))
-        .max_by(|a, b| a.0.total_cmp(&b.0));
+    // Sums along lines for each wave across them, and of these for each wave along them.
+    let steps = || (-5..=5).map(f64::from);
+    let near = steps().flat_map(|i| {
+        let across = q.x + i * step.x;
+        let waves = (0..scene.columns).map(|x| -across * (x as f64 - scene.middle.x));
+        let waves: Vec<Complex64> = waves.map(Complex64::cis).collect();
+        let lines = values.chunks_exact(scene.columns);
+        let line = |line: &[Complex64]| line.iter().zip(&waves).map(|(a, b)| a * b).sum();
+        let sums: Vec<Complex64> = lines.map(line).collect();
+        steps().map(move |j| {
+            let up = q.y + j * step.y;
+            let turn = |y| Complex64::cis(-up * (y as f64 - scene.middle.y));
+            let sum: Complex64 = sums.iter().enumerate().map(|(y, s)| s * turn(y)).sum();
+            (sum.norm_sqr(), Vector2::new(across, up))
+        })
+    });
+    let best = near.max_by(|a, b| a.0.total_cmp(&b.0));
     best.map_or(q, |(_, q)| q)
 }

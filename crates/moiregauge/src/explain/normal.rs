@@ -18,6 +18,17 @@ pub(crate) struct Normal {
     pub(crate) moment: DVector<f64>,
 }
 
+impl Normal {
+    /// That of some of the amplitudes.
+    pub(crate) fn part(&self, kept: &[usize]) -> Self {
+        let value = |i: usize, j: usize| self.gram[(kept[i], kept[j])];
+        Self {
+            gram: DMatrix::from_fn(kept.len(), kept.len(), value),
+            moment: DVector::from_fn(kept.len(), |i, _| self.moment[kept[i]]),
+        }
+    }
+}
+
 /// Some rows and columns of a Gram matrix.
 type Tile = [[f64; LANES]; LANES];
 
@@ -140,13 +151,7 @@ pub(crate) fn amplitudes(normal: &Normal, ridge: f64) -> Option<DVector<f64>> {
 
 /// What amplitudes of the harmonics `kept` fitted to the other folds explain of each block: the drop of its sum of squares.
 pub(crate) fn gains(normals: &[Normal], kept: &[usize]) -> Option<Vec<f64>> {
-    let of = |normal: &Normal| Normal {
-        gram: DMatrix::from_fn(kept.len(), kept.len(), |i, j| {
-            normal.gram[(kept[i], kept[j])]
-        }),
-        moment: DVector::from_fn(kept.len(), |i, _| normal.moment[kept[i]]),
-    };
-    let parts: Vec<Normal> = normals.iter().map(of).collect();
+    let parts: Vec<Normal> = normals.iter().map(|normal| normal.part(kept)).collect();
     let mut found = vec![0.0; parts.len()];
     for fold in 0..FOLDS {
         let held = |b: &usize| Scene::fold(*b) == fold;

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Vector2};
 
 use crate::explain::evidence::{Blocks, weakest_family};
-use crate::explain::normal::gains;
+use crate::explain::normal::{gains, total};
 use crate::explain::phases::Phases;
 use crate::explain::scene::Scene;
 use crate::frame::image::Image;
@@ -31,7 +31,7 @@ impl WithWaves {
         let (waves, _) = scene.waves_beside(&(pair * binning), None, indices)?;
         let fitted = waves.fitted(&scene, indices, 0)?;
         let normals = fitted.normals(&scene, indices);
-        let amplitudes = Phases::amplitudes(&normals)?;
+        let amplitudes = Phases::amplitudes(&total(&normals))?;
         let (lattice, beside) = amplitudes.split_at(indices.len());
         let first = lattice[..FIRST_SHELL.len()].iter();
         let least = STRONG * first.fold(f64::INFINITY, |least, a| least.min(*a));
