@@ -1,5 +1,6 @@
 //! Harmonics of a lattice whose phases may bend.
 
+use std::array::from_fn;
 use std::ops::Range;
 
 use nalgebra::{DVector, Matrix2, Vector2};
@@ -149,7 +150,8 @@ impl Phases {
                     || {
                         for n in 1..=most {
                             for j in 0..2 {
-                                powers[n][j] = product(&powers[n - 1][j], &stepped[j], [1.0; 2]);
+                                let next = product(&powers[n - 1][j], &stepped[j], [1.0; 2]);
+                                powers[n][j] = next;
                             }
                         }
                         let of_indices = columns.chunks_exact_mut(2).zip(indices);
@@ -213,31 +215,29 @@ impl Phases {
                     #[inline(always)]
                     || {
                         take_off(functions, weights, &mut rest);
-                        let slope = |j: usize, t: usize| {
-                            weights[2 * j + 1] * functions[2 * j][t]
-                                - weights[2 * j] * functions[2 * j + 1][t]
+                        let slope = |j: usize| -> Lanes {
+                            let (cos, sin) = (&functions[2 * j], &functions[2 * j + 1]);
+                            let (a, b) = (weights[2 * j], weights[2 * j + 1]);
+                            from_fn(|t| b * cos[t] - a * sin[t])
                         };
                         let mut of_pair = [[0.0; STRETCH]; 2];
                         for (j, index) in indices.iter().enumerate() {
+                            let slope = slope(j);
                             for (sums, i) in of_pair.iter_mut().zip(index) {
-                                let i = f64::from(*i);
-                                (0..STRETCH).for_each(|t| sums[t] += i * slope(j, t));
+                                let sum = sums.iter_mut().zip(&slope);
+                                sum.for_each(|(sum, slope)| *sum += f64::from(*i) * slope);
                             }
                         }
-                        for (shape, slopes) in slopes[..2 * shapes].chunks_exact_mut(2).enumerate()
-                        {
-                            for (slopes, of_pair) in slopes.iter_mut().zip(&of_pair) {
-                                (0..STRETCH)
-                                    .for_each(|t| slopes[t] = of_pair[t] * places[shape][t]);
-                            }
+                        let times = |a: &Lanes, b: &Lanes| from_fn(|t| a[t] * b[t]);
+                        let (shared, own) = slopes.split_at_mut(2 * shapes);
+                        for (slopes, place) in shared.chunks_exact_mut(2).zip(&places) {
+                            let each = slopes.iter_mut().zip(&of_pair);
+                            each.for_each(|(slopes, of_pair)| *slopes = times(of_pair, place));
                         }
-                        let of_others = slopes[2 * shapes..].chunks_exact_mut(2);
-                        for (j, slopes) in of_others.enumerate() {
-                            for (slopes, place) in slopes.iter_mut().zip(&places) {
-                                (0..STRETCH).for_each(|t| {
-                                    slopes[t] = slope(indices.len() + j, t) * place[t]
-                                });
-                            }
+                        for (j, slopes) in own.chunks_exact_mut(2).enumerate() {
+                            let slope = slope(indices.len() + j);
+                            let each = slopes.iter_mut().zip(&places);
+                            each.for_each(|(slopes, place)| *slopes = times(&slope, place));
                         }
                     },
                 );
@@ -345,11 +345,11 @@ fn add(
 ) {
     let mut row = vec![0.0; columns.len()];
     for (lane, (block, value)) in scene.block[bins].iter().zip(values).enumerate() {
-        if let Some(block) = *block {
-            let each = row.iter_mut().zip(columns);
-            each.for_each(|(own, column)| *own = column[lane]);
-            sums.add(to(block), &row, *value);
+        let Some(block) = *block else { continue };
+        for (own, column) in row.iter_mut().zip(columns) {
+            *own = column[lane];
         }
+        sums.add(to(block), &row, *value);
     }
 }
 
@@ -370,7 +370,7 @@ fn ground(scene: &Scene, first: usize, columns: &mut [Lanes]) -> [Lanes; 2 + CUB
 }
 
 /// Takes the sum of columns, each times its weight, off the values.
-#[inline(always)]
+#[inline]
 fn take_off(columns: &[Lanes], weights: &[f64], values: &mut Lanes) {
     for (column, weight) in columns.iter().zip(weights) {
         let each = values.iter_mut().zip(column);
@@ -379,15 +379,13 @@ fn take_off(columns: &[Lanes], weights: &[f64], values: &mut Lanes) {
 }
 
 /// Products of two waves, or of their conjugates where the sign is negative; of a sign of 0 the imaginary part counts as 0.
-#[inline(always)]
+#[inline]
 fn product(a: &[Lanes; 2], b: &[Lanes; 2], signs: [f64; 2]) -> [Lanes; 2] {
-    let mut both = [[0.0; STRETCH]; 2];
-    for t in 0..STRETCH {
-        let (a, b) = ([a[0][t], signs[0] * a[1][t]], [b[0][t], signs[1] * b[1][t]]);
-        both[0][t] = a[0] * b[0] - a[1] * b[1];
-        both[1][t] = a[0] * b[1] + a[1] * b[0];
-    }
-    both
+    let [s, t] = signs;
+    [
+        from_fn(|i| a[0][i] * b[0][i] - s * t * (a[1][i] * b[1][i])),
+        from_fn(|i| t * (a[0][i] * b[1][i]) + s * (a[1][i] * b[0][i])),
+    ]
 }
 
 /// A wave along a line whose phase is a cubic polynomial, from the phases of the first four bins: the value is stepped by its ratios of first, second
@@ -395,8 +393,9 @@ fn product(a: &[Lanes; 2], b: &[Lanes; 2], signs: [f64; 2]) -> [Lanes; 2] {
 fn step([a, b, c, d]: [f64; 4], lanes: &mut [Lanes; 2]) {
     let ratios = [a, b - a, c - 2.0 * b + a, d - 3.0 * c + 3.0 * b - a];
     let [mut value, mut first, mut second, third] = ratios.map(Complex64::cis);
-    for t in 0..STRETCH {
-        (lanes[0][t], lanes[1][t]) = (value.re, value.im);
+    let [re, im] = lanes;
+    for (re, im) in re.iter_mut().zip(im) {
+        (*re, *im) = (value.re, value.im);
         (value, first, second) = (value * first, first * second, second * third);
     }
 }
