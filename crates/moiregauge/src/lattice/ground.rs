@@ -21,6 +21,7 @@ use crate::frame::median_ground::running_median;
 use crate::lattice::fit::fitted::LatticeFit;
 use crate::lattice::measure::measure_pair;
 use crate::lattice::measured::MeasuredLattice;
+use crate::lattice::predicted::accepted;
 use crate::lattice::start::Start;
 use crate::numbers::interrupt;
 use crate::numbers::three::three;
@@ -61,7 +62,7 @@ pub(crate) fn below(
         let plain = found.change.is_none() && found.grains.is_empty();
         let again = || on_even_ground(calm, &signs, &found, geometry, background);
         let fine = plain.then(again).flatten();
-        Some(fine.unwrap_or(found))
+        accepted(fine.unwrap_or(found), geometry).ok()
     })
 }
 

@@ -163,7 +163,7 @@ pub(crate) fn with_evidence(
 /// [`LatticeError::OneOfMany`]: other peaks of the image could form a lattice as well. [`LatticeError::NotPredicted`]: it does not predict held-out
 /// pixels. [`LatticeError::Distorted`]: its cell is too far from a hexagon. [`LatticeError::TooFewPeriods`]: fewer than two periods fit across the frame.
 /// [`LatticeError::NowhereTogether`]: it varies too much.
-fn accepted(
+pub(crate) fn accepted(
     mut found: MeasuredLattice,
     geometry: &Geometry,
 ) -> Result<MeasuredLattice, LatticeError> {
