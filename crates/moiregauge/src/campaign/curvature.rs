@@ -26,9 +26,11 @@ pub(crate) fn seen_by_set(
     let lines = || scans.iter().flat_map(|s| &s.lines);
     let times =
         lines().filter_map(|l| Some(l.timing?.per_pixel.y.abs() * l.geometry.size[1] as f64));
-    let time = times.fold(f64::INFINITY, f64::min);
+    // Images without times have no lever: any time will do.
+    let time = times.reduce(f64::min).unwrap_or(1.0);
     let change = (drift.0.component_mul(&drift.0) + drift.1.diagonal()) / (time * time);
-    let before = Matrix2::from_diagonal(&change);
+    // A sample that is known to be at rest: what rounding leaves.
+    let before = Matrix2::from_diagonal(&change.add_scalar(f64::EPSILON));
     let ages = scans
         .iter()
         .flat_map(|s| vec![middle_of_frame(s); s.lines.iter().len()]);

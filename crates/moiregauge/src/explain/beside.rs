@@ -182,7 +182,9 @@ impl Scene {
         {
             let mut alone = Phases::straight(*pair);
             alone.others.push(wave);
-            let fitted = alone.fitted(&left, &[], 0)?;
+            let Some(fitted) = alone.fitted(&left, &[], 0) else {
+                break;
+            };
             waves.others.extend(fitted.others);
             left.values = waves.residual(&rest, &[])?;
         }
