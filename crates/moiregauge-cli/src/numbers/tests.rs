@@ -4,6 +4,7 @@ use std::any::TypeId;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc;
+use std::thread;
 use std::time::Duration;
 
 use clap::{Arg, FromArgMatches as _};
@@ -89,7 +90,7 @@ fn beside(command: &str, option: &str) -> Vec<&'static str> {
 fn base(command: &str, option: &str, folder: &Path) -> Option<Vec<OsString>> {
     let scans = folder.join("simulated");
     let scan = scans.join("scan.000.spm");
-    let out = |name: &str| folder.join(name).into_os_string();
+    let out = |name: &str| folder.join(format!("{option}-{name}")).into_os_string();
     let words = |text: &str| text.split(' ').map(OsString::from).collect::<Vec<_>>();
     let mut base = words("moiregauge");
     base.push(command.into());
@@ -181,7 +182,7 @@ fn parsed(words: &[OsString]) -> Result<Cli, String> {
 /// Runs the command on a thread of its own; whether it ended well.
 fn ended(words: &[OsString], cli: Cli) -> Result<bool, String> {
     let (send, receive) = mpsc::channel();
-    std::thread::spawn(move || {
+    thread::spawn(move || {
         let job = Job::quiet(None).expect("threads");
         send.send(run(&cli.command, &job).is_ok())
     });
@@ -202,14 +203,24 @@ fn every_numeric_option_has_a_range() {
         .chain(small)
         .collect();
     assert!(ended(&set, parsed(&set).unwrap()).unwrap());
-    let (mut tried, mut wrong) = (0, Vec::new());
-    for command in arguments().get_subcommands() {
-        let name = command.get_name();
-        for option in command.get_arguments().filter(|option| is_numeric(option)) {
-            tried += 1;
-            wrong.extend(try_option(name, option, folder.path()));
-        }
-    }
+    let commands = arguments();
+    let all = commands.get_subcommands().flat_map(|command| {
+        let numeric = command.get_arguments().filter(|option| is_numeric(option));
+        numeric.map(|option| (command.get_name(), option))
+    });
+    // They wait for the disk more than they compute.
+    let (folder, all) = (folder.path(), all.collect::<Vec<_>>());
+    let wrong: Vec<String> = thread::scope(|scope| {
+        let each = all.chunks(all.len().div_ceil(8)).map(|part| {
+            let try_one =
+                move |(command, option): &(&str, &Arg)| try_option(command, option, folder);
+            scope.spawn(move || part.iter().flat_map(try_one).collect::<Vec<_>>())
+        });
+        let running: Vec<_> = each.collect();
+        let ended = running.into_iter().map(|part| part.join().unwrap());
+        ended.flatten().collect()
+    });
+    let tried = all.len();
     assert!(tried > 80, "{tried}");
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }

@@ -14,11 +14,11 @@ pub(crate) const DPI: f64 = 300.0;
 pub(crate) fn render(svg: &str) -> Result<Vec<u8>, ReportError> {
     let picture = pixmap(svg, DPI)?;
     // The page is painted white, so that there is no transparency left to keep.
-    let opaque: Vec<u8> = picture
-        .pixels()
-        .iter()
-        .flat_map(|p| [p.red(), p.green(), p.blue()])
-        .collect();
+    let pixels = picture.data().chunks_exact(4);
+    let mut opaque = vec![0; 3 * pixels.len()];
+    for (opaque, pixel) in opaque.chunks_exact_mut(3).zip(pixels) {
+        opaque.copy_from_slice(&pixel[..3]);
+    }
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, picture.width(), picture.height());
     encoder.set_color(png::ColorType::Rgb);

@@ -59,14 +59,18 @@ pub(crate) fn cropped(
 /// Means over blocks of `factor` × `factor` pixels; an incomplete block at the end counts as well.
 fn reduced(image: &Image, factor: usize) -> Image {
     let (rows, columns) = (image.rows.div_ceil(factor), image.columns.div_ceil(factor));
-    let mut values = Vec::with_capacity(rows * columns);
-    for row in 0..rows {
-        for column in 0..columns {
-            let block = cropped(image, row * factor, column * factor, factor, factor);
-            let finite: Vec<f64> = block.values.into_iter().filter(|v| v.is_finite()).collect();
-            values.push(finite.iter().sum::<f64>() / finite.len() as f64);
+    // Sum and number of the values of each block.
+    let mut blocks = vec![[0.0; 2]; rows * columns];
+    for row in 0..image.rows {
+        let line = blocks[row / factor * columns..].iter_mut();
+        for ([sum, count], values) in line.zip(image.row(row).chunks(factor)) {
+            for value in values.iter().filter(|v| v.is_finite()) {
+                *sum += value;
+                *count += 1.0;
+            }
         }
     }
+    let values = blocks.iter().map(|[sum, count]| sum / count).collect();
     Image::new(rows, columns, values)
 }
 

@@ -96,7 +96,8 @@ fn candidates(
     let (Some(to_physical), Some(wanted)) = (to_physical, reciprocal(known)) else {
         return Vec::new();
     };
-    let like = |pair: &Matrix2<f64>| resembles(&(to_physical * pair), &wanted, most);
+    let names = names(&wanted);
+    let like = |pair: &Matrix2<f64>| resembles(&(to_physical * pair), &names, most);
     let peaks = spectrum_peaks(spectrum);
     let generators = generators(&peaks, spectrum, &to_physical, &wanted, most);
     let mut found = Vec::new();
@@ -175,14 +176,20 @@ fn generators(
     kept
 }
 
-/// Whether `pair` is `wanted`, turned and a little distorted, under any of its names.
-fn resembles(pair: &Matrix2<f64>, wanted: &Matrix2<f64>, most: f64) -> bool {
-    let Some(inverse) = wanted.try_inverse() else {
-        return false;
-    };
-    renamings(1).any(|name| {
-        let shape = ComplexPair::from(pair * name * inverse);
-        (1.0 / MOST_SCALE..MOST_SCALE).contains(&shape.p.norm()) && shape.distortion() < most
+/// What makes of each name of the lattice `wanted` the identity; nothing if its vectors are parallel.
+fn names(wanted: &Matrix2<f64>) -> Vec<Matrix2<f64>> {
+    let inverse = wanted.try_inverse();
+    let each = inverse.map(|inverse| renamings(1).map(move |name| name * inverse));
+    each.into_iter().flatten().collect()
+}
+
+/// Whether `pair` is the lattice of these `names`, turned and a little distorted, under any of them.
+fn resembles(pair: &Matrix2<f64>, names: &[Matrix2<f64>], most: f64) -> bool {
+    names.iter().any(|name| {
+        let shape = ComplexPair::from(pair * name);
+        let [size, stretch] = [shape.p, shape.q].map(|z| z.norm_sqr());
+        let sizes = MOST_SCALE.powi(-2)..MOST_SCALE.powi(2);
+        sizes.contains(&size) && stretch < most.powi(2) * size
     })
 }
 
@@ -194,17 +201,15 @@ mod tests {
     #[test]
     fn the_known_cell_is_recognised_at_any_angle() {
         let hexagon = Matrix2::new(1.0, 0.5, 0.0, 0.75_f64.sqrt());
+        let names = names(&hexagon);
         for turn in [0.0, 0.7, 2.1, 4.4] {
             let turn = nalgebra::Rotation2::new(turn).into_inner();
             let stretched = Matrix2::new(1.05, 0.02, 0.0, 0.97) * turn * hexagon;
-            assert!(resembles(&stretched, &hexagon, MOST_DISTORTION));
-            assert!(!resembles(
-                &(stretched * 3_f64.sqrt()),
-                &hexagon,
-                MOST_DISTORTION
-            ));
+            let resembles = |pair: Matrix2<f64>| resembles(&pair, &names, MOST_DISTORTION);
+            assert!(resembles(stretched));
+            assert!(!resembles(stretched * 3_f64.sqrt()));
             let rectangle = turn * Matrix2::new(1.0, 0.0, 0.0, 2.0);
-            assert!(!resembles(&rectangle, &hexagon, MOST_DISTORTION));
+            assert!(!resembles(rectangle));
         }
     }
 }
