@@ -176,7 +176,7 @@ fn generators(
     kept
 }
 
-/// What makes of each name of the lattice `wanted` the identity; nothing if its vectors are parallel.
+/// `U W⁻¹` for each renaming U of the pair W (`wanted`): a pair P is W after the map `P U W⁻¹`. Empty for parallel vectors.
 fn names(wanted: &Matrix2<f64>) -> Vec<Matrix2<f64>> {
     let inverse = wanted.try_inverse();
     let each = inverse.map(|inverse| renamings(1).map(move |name| name * inverse));
@@ -211,5 +211,11 @@ mod tests {
             let rectangle = turn * Matrix2::new(1.0, 0.0, 0.0, 2.0);
             assert!(!resembles(rectangle));
         }
+        // p = 1 and q the stretch.
+        let stretched = |by: f64| Matrix2::new(1.0 + by, 0.0, 0.0, 1.0 - by) * hexagon;
+        let resembles = |pair: Matrix2<f64>| resembles(&pair, &names, MOST_DISTORTION);
+        assert!(resembles(stretched(0.24)) && !resembles(stretched(0.26)));
+        assert!(resembles(hexagon * 1.59) && !resembles(hexagon * 1.61));
+        assert!(resembles(hexagon / 1.59) && !resembles(hexagon / 1.61));
     }
 }
