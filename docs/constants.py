@@ -97,7 +97,8 @@ def prepare(crates, lines):
 
         head = re.search(definition(name), text, re.M)
         # Words quote the value as it stands.
-        text = text.replace(f"{{{name}}}", head.group(4))
+        quoted = re.compile(rf"\{{{name}(?::[^}}]*)?\}}")
+        text = quoted.sub(head.group(4), text)
         head = re.search(definition(name), text, re.M)
         before, after = text[: head.start()], text[head.end() :]
         use = re.compile(rf"(?<![:\w`\"]){name}\b(?!\()(?!`)")
@@ -108,10 +109,11 @@ def prepare(crates, lines):
 
         found[0].write_text(used(before) + call(head) + used(after))
         # Files that import it call it as well.
-        imported = re.compile(rf"^(?:pub\(crate\) )?use crate::[\w:]*\b{found[0].stem}::(?:\{{[^}}]*\b{name}\b[^}}]*\}}|{name});\n", re.M)
+        module = found[0].parent.name if found[0].stem == "mod" else found[0].stem
+        imported = re.compile(rf"^(?:pub\(crate\) )?use crate::[\w:]*\b{module}::(?:\{{[^}}]*\b{name}\b[^}}]*\}}|{name});\n", re.M)
         for crate in CRATES:
             for file in sorted((crates / crate / "src").rglob("*.rs")):
-                text = file.read_text()
+                text = quoted.sub(head.group(4), file.read_text())
                 import_of = imported.search(text)
                 if file != found[0] and import_of:
                     file.write_text(used(text[: import_of.start()]) + import_of.group() + used(text[import_of.end() :]))

@@ -41,7 +41,7 @@ const LARGEST_DISTORTION: f64 = 0.1;
 const LARGEST_MISFIT: f64 = 0.05;
 /// With frames of one direction, another orientation with a distortion that is larger by less than this is as good.
 /// Half and twice as much change no result of docs/constants.md.
-const AMBIGUOUS: f64 = 0.1;
+pub(crate) const AMBIGUOUS: f64 = 0.1;
 /// Orientations that differ by less are the same, rad: two names of one lattice agree to rounding.
 const SAME_ANGLE: f64 = 1e-3;
 /// χ²/dof beyond which the scatter of the images deserves a word: errors wrong by 1.4.

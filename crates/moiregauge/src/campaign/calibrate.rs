@@ -20,6 +20,7 @@ use spmfile::{FrameDirection, LineDirection};
 use crate::calibration::curvature::SeenBySet;
 use crate::calibration::{Calibration, Coordinates, Curvature, KnownLattice, Shown, shown};
 use crate::campaign::alike::{Alike, alike};
+use crate::campaign::atomic::AMBIGUOUS;
 use crate::campaign::curvature::seen_by_set;
 use crate::campaign::group::{Group, groups};
 use crate::campaign::identity::once;
@@ -36,8 +37,6 @@ use crate::numbers::chi2::enlargement;
 use crate::scan::measured::{MeasuredLine, MeasuredScan};
 use crate::settings::knobs::Grouping;
 
-/// Another way of naming the vectors that is not this much more distorted is a doubt. Chosen by eye.
-const AMBIGUOUS: f64 = 0.1;
 /// Lattices of frames of one direction that differ by more than this share are of different things. Chosen by eye.
 const SAME: f64 = 0.35;
 /// Frames up and down that a constant drift does not make of one another to this share are not used. Half and twice as

@@ -28,7 +28,7 @@ use crate::settings::knobs::Settings;
 
 /// Wavelengths that differ by more than this are not of the same lattice: five times the calibration that is assumed,
 /// …
-const SAME_LATTICE: f64 = 0.05;
+pub(crate) const SAME_LATTICE: f64 = 0.05;
 /// … nor are those that differ by more than this if their errors do not explain it: χ² of four components beyond
 /// `NO_CHANCE`. Twice the calibration that is assumed.
 const NEARLY_SAME: f64 = 0.02;

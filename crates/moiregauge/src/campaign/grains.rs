@@ -6,6 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use heterostrain::lattice::{Lattice, labelled_like};
 
 use crate::campaign::analysis::{Analysis, Drift, SetAnalysis};
+use crate::campaign::combine::SAME_LATTICE;
 use crate::caveat::lattices::LatticeDoubt;
 use crate::caveat::sets::SetDoubt;
 use crate::caveat::{Caveat, Doubt};
@@ -15,9 +16,6 @@ use crate::numbers::chi2;
 const CONTRADICTED: f64 = 1e-6;
 /// Ratio of variances from which the drift of one set is believed against that of another; else neither is.
 const BETTER_KNOWN: f64 = 9.0;
-/// A set of other scans shows the nearest of the grains, if their vectors differ by less than this share of them: drift that is not known makes a few
-/// per cent between two slow axes. Chosen by eye.
-const SAME_GRAIN: f64 = 0.05;
 /// nm/s → nm/min.
 const PER_MINUTE: f64 = 60.0;
 
@@ -78,7 +76,7 @@ pub fn grains(analysis: &Analysis) -> Option<Vec<Vec<usize>>> {
             let first = lattices[grain[0]].as_ref().filter(|_| !beside)?;
             let (a, b) = (first.basis, labelled_like(lattice, &first.basis).basis);
             let apart = (b - a).norm() / a.norm();
-            (apart < SAME_GRAIN).then_some(apart)
+            (apart < SAME_LATTICE).then_some(apart)
         };
         let known = found.iter().enumerate();
         let known = known.filter_map(|(i, grain)| Some((i, apart(grain)?)));

@@ -29,7 +29,7 @@ use crate::numbers::three::three;
 /// An edge cuts a window off that makes the variance of a phase larger than this, times the least.
 const WHOLE_WINDOW: f64 = 1.5;
 
-/// Fewer nodes than this tell nothing of a lattice. Chosen by eye.
+/// Fewer nodes than this tell nothing of a lattice: twice as many as a phase that is a plane has numbers.
 const FEWEST_INNER: usize = 6;
 
 /// Rounds in which what windows make of a description is taken off: each leaves a tenth or two of what the one before left.

@@ -11,6 +11,7 @@ use crate::coverage::cells::Cells;
 use crate::coverage::nodes::{Node, View, information, neighbours, nodes};
 use crate::coverage::patch::LatticeRegion;
 use crate::coverage::phases::{Fit, fit, freedom, powers, price, rows, value};
+use crate::numbers::MOST_ROUNDS;
 
 /// Nodes from which lattices are followed, about.
 const SEEDS: f64 = 36.0;
@@ -28,9 +29,6 @@ const MISFIT: f64 = 1.5;
 /// Phases that are off by less than this from a lattice (rad, root mean square of three) may be of it when two are chosen: half of what is
 /// asked of a neighbour, so that no lattice between two is taken for either.
 const NEAR: f64 = 0.4;
-
-/// Rounds of fits to both grains and of nodes given to the nearer one. Chosen by eye.
-const REFINED: usize = 4;
 
 /// Phases that are off by more than this from both lattices (rad, root mean square of three) are of neither: by chance those of
 /// three waves that have nothing to do with a lattice are nearer once in ten.
@@ -53,7 +51,7 @@ pub(crate) fn split(view: &View, patch: &LatticeRegion) -> Option<Grains> {
         return None;
     }
     let mut owner = halves(patch, &all)?;
-    for _ in 0..REFINED {
+    for _ in 0..MOST_ROUNDS {
         let parts = [0, 1].map(|which| part(&all, &owner, Some(which)));
         if parts.iter().any(|p| p.len() < FEWEST_NODES) {
             return None;
@@ -62,7 +60,11 @@ pub(crate) fn split(view: &View, patch: &LatticeRegion) -> Option<Grains> {
         let [Some(a), Some(b)] = fits else {
             return None;
         };
+        let before = owner;
         owner = all.iter().map(|node| nearer(node, [&a, &b])).collect();
+        if owner == before {
+            break;
+        }
     }
     let parts = [0, 1].map(|which| part(&all, &owner, Some(which)));
     if parts.iter().any(|p| p.len() < FEWEST_NODES) {

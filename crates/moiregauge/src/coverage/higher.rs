@@ -14,6 +14,7 @@ use crate::coverage::phases::Fit;
 use crate::frame::image::Image;
 use crate::numbers::median::median;
 use crate::numbers::normal_equations::NormalEquations;
+use crate::spectrum::shells::FASTEST;
 
 /// The first shell, as multiples of K₁ and K₂.
 const FIRST: [[i32; 2]; 3] = [[1, 0], [0, 1], [-1, 1]];
@@ -33,9 +34,6 @@ const HIGHER: [[i32; 2]; 12] = [
     [1, -3],
     [2, -3],
 ];
-
-/// Harmonics beyond this, cycles per pixel along an axis, are sampled too coarsely.
-const FASTEST: f64 = 0.45;
 
 /// Unknowns are let go where the pixels tell so little of them, as a share of what they would tell alone.
 const HELD: f64 = 1e-9;
@@ -59,7 +57,7 @@ pub(crate) fn parts(view: &View, patch: &LatticeRegion, fit: &Fit) -> Option<Par
         .chain(HIGHER)
         .filter(|[h, k]| {
             let q = patch.pair * Vector2::new(f64::from(*h), f64::from(*k));
-            q.amax() < FASTEST * std::f64::consts::TAU
+            q.amax() < FASTEST
         })
         .collect();
     let size = BACKGROUND + 2 * names.len();

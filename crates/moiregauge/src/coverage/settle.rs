@@ -21,6 +21,7 @@ use crate::coverage::sides::without_tails;
 use crate::frame::departure::Departure;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
+use crate::numbers::MOST_ROUNDS;
 use crate::numbers::three::three;
 
 /// Windows that are tried, mean periods: the narrowest that keeps waves a wave vector apart, and wider ones for
@@ -29,9 +30,6 @@ const WIDTHS: [f64; 4] = [0.8, 1.2, 1.8, 2.7];
 
 /// Bins per shortest period; pixels are averaged where there are twice as many: harmonics need not be resolved.
 const BINS_PER_PERIOD: f64 = 8.0;
-
-/// Rounds of patch and pair, at most. Chosen by eye.
-const ROUNDS: usize = 8;
 
 /// The pair stands still when it moves by less than this over the patch, cycles.
 const STILL: f64 = 0.02;
@@ -115,7 +113,8 @@ fn settle_bins(
     let mut pair = *pair;
     let mut narrowest = 0;
     let mut settled = None;
-    for round in 0..ROUNDS {
+    let mut before = f64::INFINITY;
+    for round in 0..MOST_ROUNDS {
         let waves = frame.waves(&pair);
         if round == 0 {
             let together = waves.together();
@@ -131,9 +130,11 @@ fn settle_bins(
         let patch = patch(&cells, &seen.inside, &pair)?;
         let (step, turn) = slope(&cells, &seen, &patch.inside)?;
         settled = Some((waves, seen, pair));
-        if turn < STILL {
+        // A turn that grows does not end.
+        if turn < STILL || turn > before {
             break;
         }
+        before = turn;
         pair += step;
     }
     let (waves, mut seen, pair) = settled?;

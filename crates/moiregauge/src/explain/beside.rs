@@ -3,7 +3,7 @@
 //! They are part of every description of an image: what they make of a block is known from the other blocks, and stripes that no description holds
 //! drown a weak shell.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 use nalgebra::{Matrix2, Vector2};
 use rustfft::num_complex::Complex64;
@@ -18,7 +18,7 @@ use crate::frame::image::Image;
 use crate::numbers::exact;
 use crate::numbers::median::median;
 use crate::spectrum::error::SECOND;
-use crate::spectrum::shells::{FIRST_SHELL, shells};
+use crate::spectrum::shells::{FASTEST, FIRST_SHELL, shells};
 use crate::spectrum::transform::Spectrum;
 
 /// Waves that are taken off, at most: stripes with an overtone, and hum beside them.
@@ -31,8 +31,6 @@ const LOOKED_AT: usize = 12;
 const LOBE: f64 = 1.6;
 /// Distance from the points of strong harmonics that holds their skirts, cycles per frame: those of a lattice that bends, or ends.
 const SKIRT: f64 = 3.0;
-/// Fastest wave that counts, rad per bin: at the limit of sampling a wave is its own mirror image.
-const FASTEST: f64 = 0.9 * PI;
 /// Fewest cycles in the frame: slower waves are background.
 const SLOWEST: f64 = 2.0;
 /// Fewest cycles along a line: what whole lines do has fewer.

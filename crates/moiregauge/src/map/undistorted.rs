@@ -10,14 +10,12 @@ use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::frame::resample::at;
 use crate::map::followed::Followed;
-use crate::numbers::interrupt;
+use crate::numbers::{MOST_ROUNDS, interrupt};
 
 /// Largest number of pixels, that of 2048 × 2048: finer images are made coarser.
 const MOST_PIXELS: f64 = 4_194_304.0;
-/// Iterations end where a place moves by less than this share of a pixel, and give up after this number: fields that change by
-/// more than three quarters of a way over that way are no lattice any more.
+/// Iterations end where a place moves by less than this share of a pixel.
 const SETTLED: f64 = 1e-3;
-const ROUNDS: usize = 40;
 
 /// An image of the mean lattice.
 #[derive(Clone, Debug)]
@@ -80,7 +78,7 @@ fn settled(
     mut guess: Vector2<f64>,
     close: f64,
 ) -> Option<Vector2<f64>> {
-    for _ in 0..ROUNDS {
+    for _ in 0..MOST_ROUNDS {
         let next = followed.at(place + guess)?;
         let moved = (next - guess).norm();
         guess = next;

@@ -17,6 +17,9 @@ pub(crate) mod three;
 pub(crate) mod widest;
 pub(crate) mod words;
 
+/// Rounds of what ends when nothing moves any more, at most: such a loop takes a dozen. One that takes this many does not end. Chosen by eye.
+pub(crate) const MOST_ROUNDS: usize = 80;
+
 pub use rng::{normals, stream};
 pub use widest::widest;
 pub use words::{fixed, line_name, plus_minus, two_digits};

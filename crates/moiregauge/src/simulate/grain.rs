@@ -54,7 +54,7 @@ enum Contrast {
     },
 }
 
-/// Width of a node in widths of a wall: round spots, by eye.
+/// Width of a node in widths of a wall: round spots.
 const NODE: f64 = 2.0;
 
 impl Grain {

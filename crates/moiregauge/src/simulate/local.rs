@@ -3,6 +3,7 @@
 use heterostrain::strain::{Stacking, moire_pair_of};
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
+use crate::numbers::MOST_ROUNDS;
 use crate::simulate::settings::Sample;
 
 /// Twist (rad), strain vector `ε (cos 2φ, sin 2φ)` with φ in the laboratory.
@@ -24,8 +25,6 @@ impl Local {
     }
 }
 
-/// Steps of Newton's method; it doubles its digits with each, strains change by little.
-const STEPS: usize = 30;
 /// rad: differences that are taken, and the accuracy, far below what is printed.
 const STEP: f64 = 1e-7;
 
@@ -49,7 +48,7 @@ pub(crate) fn local(sample: &Sample, reciprocal: &Matrix2<f64>) -> Option<Local>
     };
     let start = Vector4::new(uniform.twist, uniform.strain.x, uniform.strain.y, angle);
     let mut x = start;
-    for _ in 0..STEPS {
+    for _ in 0..MOST_ROUNDS {
         let here = waves_of(&x)?;
         let missing = reciprocal - here;
         let mut jacobian = Matrix4::zeros();

@@ -19,7 +19,8 @@ use crate::spectrum::error::LatticeError;
 use crate::spectrum::harmonics::Windowed;
 use crate::spectrum::prepare::{Prepared, binned, levelled};
 use crate::spectrum::select::{
-    Candidate, Orders, Peak, by_score, frame_cycles, score, spectrum_peaks, well_explained,
+    Candidate, GENERATORS, Orders, Peak, TOLERANCE, by_score, frame_cycles, score, spectrum_peaks,
+    well_explained,
 };
 use crate::spectrum::shells::shells;
 use crate::spectrum::transform::Spectrum;
@@ -32,11 +33,6 @@ const MOST_SCALE: f64 = 1.6;
 const MOST_DISTORTION: f64 = 0.25;
 /// The same where no lattice is as little distorted: a drift of half a frame does that.
 const DRIFTING: f64 = 0.45;
-/// Peaks whose wave vectors and differences may be first harmonics: more than for moirés, since high orders may be
-/// stronger. Chosen by eye.
-const GENERATORS: usize = 24;
-/// Wave vectors closer than this are the same, cycles per frame: below half a bin, at which two peaks are one.
-const SAME: f64 = 0.45;
 /// Harmonics up to this order count: twice the fourth, which reconstructions show strongest.
 const ORDERS: f64 = 8.0;
 
@@ -131,7 +127,7 @@ fn known_already(found: &[Candidate], pair: &Matrix2<f64>, spectrum: &Spectrum) 
     let frame = frame_cycles(spectrum);
     let near = |d: &Matrix2<f64>| {
         let d = frame * d;
-        d.column(0).norm() < SAME && d.column(1).norm() < SAME
+        d.column(0).norm() < TOLERANCE && d.column(1).norm() < TOLERANCE
     };
     found
         .iter()
@@ -157,7 +153,7 @@ fn generators(
     let mut offer = |q: Vector2<f64>| {
         let length = (to_physical * q).norm();
         let near = |other: &Vector2<f64>| {
-            (frame * (q - other)).norm() < SAME || (frame * (q + other)).norm() < SAME
+            (frame * (q - other)).norm() < TOLERANCE || (frame * (q + other)).norm() < TOLERANCE
         };
         if length > low && length < high && !kept.iter().any(near) {
             kept.push(q);

@@ -31,10 +31,10 @@ const HIGHEST_FREQUENCY: f64 = 0.4;
 /// How many peaks are looked at: more than two shells have, and as many of noise. Chosen by eye.
 const PEAKS: usize = 40;
 /// How many of them may span a lattice: all pairs of them are tried. Chosen by eye.
-const GENERATORS: usize = 16;
+pub(crate) const GENERATORS: usize = 16;
 /// A peak belongs to a lattice point if it is this close, in cycles per frame: below half a bin, at which two peaks
 /// are one.
-const TOLERANCE: f64 = 0.45;
+pub(crate) const TOLERANCE: f64 = 0.45;
 /// Harmonics up to this order count. Chosen by eye.
 const ORDERS: f64 = 4.0;
 /// A moiré of hexagonal layers is a hexagon distorted by less than this; see [`distortion`]. Beyond, other pairs of

@@ -1,5 +1,9 @@
 //! The shells of a hexagonal lattice: one table for all.
 
+/// Fastest wave that is fitted, rad per pixel along each axis. Its mirror image at the limit of sampling, π, is a tenth of the
+/// band away: in the smallest frame, of 16 pixels, more than a cycle.
+pub(crate) const FASTEST: f64 = 0.9 * std::f64::consts::PI;
+
 /// Harmonics (h, k) of the first five shells, one of each ± pair, near ones first, for a pair of waves at 60°: `|h K₁ + k K₂|²` is
 /// `h² + hk + k²` in units of |K|², which is 1, 3, 4, 7 and 9.
 pub(crate) const SHELLS: [[i32; 2]; 18] = [

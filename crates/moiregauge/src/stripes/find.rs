@@ -16,6 +16,7 @@ use nalgebra::Vector2;
 use crate::frame::image::Image;
 use crate::numbers::median::median;
 use crate::spectrum::transform::Spectrum;
+use crate::stripes::wave::ORDERS;
 
 /// Fewer periods than this across the frame are terrain. Half and twice as much change no result of docs/constants.md.
 const FEWEST: f64 = 3.0;
@@ -33,8 +34,6 @@ const PATTERN: f64 = -5.0;
 const OWN: f64 = 2.5;
 /// Bins around a maximum end here. Chosen by eye.
 const AROUND: f64 = 8.0;
-/// Overtones that are looked for. Chosen by eye.
-const OVERTONES: i32 = 4;
 /// An overtone may be off by this many cycles: one bin, ...
 const OFF: f64 = 1.0;
 /// ... or by this share: stripes bend. Chosen by eye.
@@ -42,7 +41,7 @@ const OFF_SHARE: f64 = 0.12;
 /// Largest difference of trace and retrace by drift and hysteresis, cycles per frame. Chosen by eye.
 const APART: f64 = 1.5;
 /// Two patterns whose wave vectors differ by less than this share are one that changes; 14° of direction.
-const SAME: f64 = 0.25;
+pub(crate) const SAME: f64 = 0.25;
 /// Patterns that are told apart: a herringbone has three directions.
 const MOST: usize = 3;
 /// Parts along each axis, one after the other: a pattern that changes across the frame is sharp in its parts.
@@ -140,7 +139,7 @@ fn patterns(images: &[Image], pitch: [f64; 2], tried: f64) -> Vec<Pattern> {
             }
         }
         let explained = |q: &Vector2<f64>| -> (f64, f64) {
-            (1..=OVERTONES)
+            (1..=ORDERS)
                 .filter_map(|n| {
                     let members = maxima.iter().filter(|m| belongs(m, q, n));
                     members.min_by(|a, b| a.log_chance.total_cmp(&b.log_chance))
@@ -160,7 +159,7 @@ fn patterns(images: &[Image], pitch: [f64; 2], tried: f64) -> Vec<Pattern> {
         if log_chance + tried > PATTERN {
             break;
         }
-        maxima.retain(|m| (1..=OVERTONES).all(|n| !is_near(m, &best, n)));
+        maxima.retain(|m| (1..=ORDERS).all(|n| !is_near(m, &best, n)));
         found.push(Pattern {
             wave: TAU * best.component_div(&frame),
             log_chance: log_chance + tried,

@@ -9,14 +9,11 @@ use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 
 use crate::frame::image::Image;
-use crate::numbers::interrupt;
+use crate::numbers::{MOST_ROUNDS, interrupt};
 use crate::spectrum::noise::LocalNoise;
 use crate::spectrum::transform::hann;
+use crate::stripes::find::SAME;
 
-/// A wave that moves by more than this share of itself is another one. Chosen by eye.
-const ANOTHER: f64 = 0.3;
-/// Gauss–Newton steps at most. Chosen by eye.
-const STEPS: usize = 20;
 /// The wave vector stands when it moves by less than this, in cycles over the frame: far below any error.
 const STANDS: f64 = 1e-6;
 /// Pixels whose sums are made together: enough for a thread.
@@ -66,7 +63,7 @@ pub(crate) fn fit(
     let size = 3 + 2 * orders.len();
     let mut wave = start;
     let mut linear = DVector::<f64>::zeros(size);
-    for step in 0..STEPS {
+    for step in 0..MOST_ROUNDS {
         // The first step finds the amplitudes alone.
         let all = if step == 0 { size } else { size + 2 };
         let change = pixels.step(&wave, &linear, all)?;
@@ -79,7 +76,7 @@ pub(crate) fn fit(
         let cycles = (moved * reach).norm() / std::f64::consts::TAU;
         if cycles < STANDS {
             // Else it is not the wave that was looked for.
-            let near = (wave - start).norm() <= ANOTHER * start.norm();
+            let near = (wave - start).norm() <= SAME * start.norm();
             return near.then(|| pixels.fitted(wave, &linear)).flatten();
         }
         if !cycles.is_finite() {

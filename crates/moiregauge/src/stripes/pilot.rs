@@ -8,7 +8,7 @@ use crate::window::blocks::mix;
 use crate::window::carrier::{Carrier, MOST_CELLS, Slope};
 use crate::window::lines::Levelled;
 use crate::window::mixed::{FOLLOWED, LOOKED_AT, Mixed, ROUNDS, WORTH};
-use crate::window::noise::{power, whole};
+use crate::window::noise::{TELLING, power, whole};
 use crate::window::smooth::{Nodes, Smoothed, smooth};
 use crate::window::widths::OF_DIFFERENCE;
 
@@ -16,11 +16,8 @@ use crate::window::widths::OF_DIFFERENCE;
 const PILOT: f64 = 0.75;
 /// Fewest periods of a frame with a carrier, and the length of its cells, periods. Chosen by eye.
 const CARRIED: f64 = 12.0;
-/// Window of the probes for noise in wavelengths; nodes are half of it apart, so that more of them have to be left than
-/// for lattices, where they are a whole one apart.
+/// Window of the probes for noise in wavelengths; nodes are half of it apart.
 const PROBE: f64 = 1.3;
-/// ... and the fewest that give a level. Chosen by eye.
-const FEWEST: usize = 12;
 
 impl Wave {
     /// Envelopes under the pilot's window at a limited number of nodes along each axis, and the nodes where the
@@ -58,7 +55,7 @@ impl Wave {
             let blocks = mix(image, mixed.place, &beside, mixed.blocks.block);
             let smoothed = smooth(&blocks, width, nodes);
             let whole = whole(&smoothed, &blocks, mixed.frame, width);
-            if whole.iter().flatten().count() < FEWEST {
+            if whole.iter().flatten().count() < TELLING {
                 return;
             }
             let probes = smoothed.envelopes.iter();

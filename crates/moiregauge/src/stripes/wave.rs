@@ -15,8 +15,8 @@ use crate::window::mixed::{Mixed, is_slow};
 use crate::window::smooth::Smoothed;
 use crate::window::types::Reference;
 
-/// Overtones that may be used.
-const ORDERS: i32 = 4;
+/// Overtones that are looked for and used.
+pub(crate) const ORDERS: i32 = 4;
 /// Blocks per wavelength, more than of lattices: three overtones do not fold onto each other.
 pub(crate) const BLOCKS: f64 = 8.0;
 /// Smallest significant change of amplitude, noise units. Chosen by eye; see docs/constants.md.

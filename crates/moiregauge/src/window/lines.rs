@@ -13,7 +13,9 @@ use rustfft::num_complex::Complex64;
 use crate::frame::image::Image;
 use crate::numbers::interrupt;
 use crate::numbers::median::median;
+use crate::spectrum::shells::SHELLS;
 use crate::spectrum::transform::hann;
+use crate::window::noise::TELLING;
 use crate::window::types::Reference;
 
 /// Offsets matter beyond this over the root of the number of lines: as in the fit of a whole image.
@@ -37,8 +39,6 @@ struct Ridge {
     power: f64,
 }
 
-/// Harmonics (h, k) that are looked after. Chosen by eye.
-const ORDERS: i32 = 3;
 /// A harmonic hardly turns along x where its kx is below this share of itself, ...
 const ON_RIDGE: f64 = 0.15;
 /// ... and cycles per line: the nearer wave of `BESIDE`.
@@ -49,8 +49,6 @@ const KEPT: f64 = 0.35;
 const BESIDE: [f64; 2] = [3.0, 5.0];
 /// Lines of which less is there have no offset of their own: half. Chosen by eye.
 const LEAST: f64 = 0.5;
-/// Powers that a level needs at least: it is good to a third then.
-const FEWEST: usize = 8;
 /// Euler's γ.
 const EULER: f64 = 0.577_215_664_901_532_9;
 
@@ -140,12 +138,11 @@ fn on_sample(reference: &Reference, g: Vector2<f64>) -> Vector2<f64> {
 /// The ky (positive, rad per pixel) of harmonics that hardly turn along the lines.
 fn standing(reference: &Reference, columns: usize) -> Vec<f64> {
     let cycle = std::f64::consts::TAU / columns as f64;
-    let all = (-ORDERS..=ORDERS).flat_map(|h| (-ORDERS..=ORDERS).map(move |k| [h, k]));
-    let found = all.filter_map(|index| {
+    let found = SHELLS.into_iter().filter_map(|index| {
         let g = reference.wave(index);
         let least = ON_RIDGE * on_sample(reference, g).norm() * reference.pitch[0];
         let stands = g.x.abs() < least + CYCLES * cycle;
-        (stands && g.y > 0.0 && g.y < std::f64::consts::PI).then_some(g.y)
+        (stands && g.y.abs() < std::f64::consts::PI).then_some(g.y.abs())
     });
     found.collect()
 }
@@ -210,7 +207,7 @@ impl Periodogram {
             within(ky).then_some(*power)
         };
         let mut powers: Vec<f64> = self.0.iter().enumerate().filter_map(of_bin).collect();
-        (powers.len() >= FEWEST).then(|| median(&mut powers) / std::f64::consts::LN_2)
+        (powers.len() >= TELLING).then(|| median(&mut powers) / std::f64::consts::LN_2)
     }
 
     /// `[a, b]` of the level `e^a |ky|^b` where `within` holds of |ky|, by least squares of the logarithms; their mean is
@@ -230,7 +227,7 @@ impl Periodogram {
             }
         }
         let [n, x, y, xx, xy] = sums;
-        if n < FEWEST as f64 {
+        if n < TELLING as f64 {
             return None;
         }
         let slope = ((n * xy - x * y) / (n * xx - x * x)).clamp(-2.0, 0.0);

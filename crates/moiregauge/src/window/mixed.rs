@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix2, Vector2};
 
+use crate::spectrum::shells::FASTEST;
 use crate::window::blocks::{Blocks, Place, mix, stride_of};
 use crate::window::carrier::Carrier;
 use crate::window::leaks::clean;
@@ -10,8 +11,6 @@ use crate::window::smooth::{Nodes, Smoothed, smooth};
 use crate::window::types::{Reference, UsedHarmonic};
 use crate::window::widths;
 
-/// Wave vectors beyond this (rad per pixel, each component) are too near the limit of sampling, π. Chosen by eye.
-const FASTEST: f64 = 2.6;
 /// A harmonic that adds less than this share to what is known is not worth its time: one per cent of the errors.
 pub(crate) const WORTH: f64 = 0.02;
 /// Times the carrier is brought up to date: twice as many cells each time, 4, 8, 16.

@@ -29,8 +29,8 @@ const AVERAGED: f64 = 3.0;
 const WHOLE: f64 = 0.85;
 /// ... nor those nearer to the edges than this, widths, for the same reason.
 const AWAY: f64 = 2.5;
-/// Nodes that have to be left: fewer tell no level. Chosen by eye.
-const FEWEST: usize = 6;
+/// Powers of noise, or nodes with powers, that a level needs at least: it is good to a third then.
+pub(crate) const TELLING: usize = 8;
 /// Multiple of the level at which powers are clipped: e⁻⁴ of chance is cut, and allowed for; defects are cut, too.
 const CUT: f64 = 4.0;
 /// Harmonics looked beside at a time, for the memory's sake.
@@ -147,7 +147,7 @@ impl Noise {
         let low = blocks.middle(0.0, 0.0);
         let high = blocks.middle(blocks.size[0] as f64 - 1.0, blocks.size[1] as f64 - 1.0);
         let whole = whole(smoothed, blocks, [low, high], *width);
-        if whole.iter().flatten().count() < FEWEST {
+        if whole.iter().flatten().count() < TELLING {
             return Self {
                 levels: vec![fallback; harmonics],
                 grid: None,

@@ -9,7 +9,7 @@ use crate::drift::joint::solve::Problem;
 /// Settling times that are tried, as shares of the duration of the campaign: factors of two, between which curves
 /// differ little.
 const SETTLING: [f64; 5] = [0.05, 0.1, 0.2, 0.4, 0.8];
-/// Fewer scans than this cannot tell an exponential from a parabola. Chosen by eye.
+/// Fewer scans than this cannot tell an exponential from a parabola: twice as many as either has numbers.
 const FEWEST_SETTLING: usize = 6;
 
 /// Fits all sightings together and adds the terms that earn it by an information criterion.

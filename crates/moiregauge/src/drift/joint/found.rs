@@ -69,11 +69,15 @@ impl JointFit {
         &self.sightings
     }
 
-    /// Whether it knows the lattice much worse than a simpler one: its terms cannot be told from the lattice (two scans
-    /// do not tell a drift that changes), so that no χ² speaks for them.
+    /// Whether it knows the lattice much worse than a simpler one, without or with the scatter about it. Without: its terms
+    /// cannot be told from the lattice (two scans do not tell a drift that changes), so that no χ² speaks for them. With:
+    /// they contradict what the simpler one describes (jumps between frames that pass for an acceleration).
     pub(crate) fn loosens(&self, simpler: &Self) -> bool {
-        let variance = |fit: &Self, i: usize| fit.unscaled.shared[(i, i)];
-        (0..4).any(|i| variance(self, i) > LOOSE * LOOSE * variance(simpler, i))
+        let worse = |this: &DMatrix<f64>, other: &DMatrix<f64>| {
+            (0..4).any(|i| this[(i, i)] > LOOSE * LOOSE * other[(i, i)])
+        };
+        worse(&self.unscaled.shared, &simpler.unscaled.shared)
+            || worse(&self.covariance, &simpler.covariance)
     }
 
     /// Bayesian information criterion, up to a constant that fits of the same data with phases have in common: −2 ln L

@@ -4,10 +4,9 @@ use nalgebra::{DMatrix, DVector, Matrix2xX, Vector2};
 
 use crate::drift::joint::evaluate::PhaseMiss;
 use crate::drift::joint::shape::Shape;
+use crate::numbers::MOST_ROUNDS;
 use crate::numbers::chi2::is_significant;
 
-/// Newton steps to the scatter: they double the digits.
-const STEPS: usize = 60;
 /// Steps smaller than this share are rounding.
 const ROUNDING: f64 = 1e-14;
 
@@ -108,7 +107,7 @@ fn scatter(squares: &[[f64; 2]], freedom: f64) -> f64 {
     }
     // Newton on 1/χ², which bends one way only: the steps come nearer from below.
     let mut variance = 0.0_f64;
-    for _ in 0..STEPS {
+    for _ in 0..MOST_ROUNDS {
         let (sum, slope) = chi2(variance);
         let step = (sum / freedom - 1.0) * sum / -slope;
         if !(step > ROUNDING * variance) {

@@ -13,14 +13,13 @@ use crate::drift::joint::instability::Displacements;
 use crate::drift::joint::link::number_blocks;
 use crate::drift::joint::sighting::{Detection, Terms};
 use crate::drift::joint::sums::ScanSums;
+use crate::numbers::MOST_ROUNDS;
 use crate::numbers::chi2::enlargement;
 use crate::numbers::normal_equations::NormalEquations;
 use crate::spectrum::phases::Phases;
 
-/// Gauss–Newton steps: more than it takes, since the problem is nearly linear.
-const STEPS: usize = 12;
-/// Rounds of estimating the instability and solving with it. Chosen by eye.
-const ROUNDS: usize = 5;
+/// The instability stands when it changes by less than this share: it is known to some ten per cent at best.
+const STILL: f64 = 0.01;
 /// Relative damping of the normal equations: any number between rounding and what changes an answer.
 const DAMPING: f64 = 1e-10;
 /// Phases are believed to be linked if they scatter by less than this share of a wavelength: less than a third of
@@ -132,12 +131,16 @@ fn converge(
     }
     let mut unscaled = iterate(sightings, layout, x, f64::INFINITY, instability)?;
     if layout.terms.phases && given.is_none() {
-        for _ in 0..ROUNDS {
+        for _ in 0..MOST_ROUNDS {
+            let before = instability;
             let now = linearise(sightings, layout, x, f64::INFINITY);
             let scatter = instability * instability;
             let seen = Displacements::new(&now.phases, &unscaled.locals(), scatter);
             instability = seen.scatter();
             unscaled = iterate(sightings, layout, x, f64::INFINITY, instability)?;
+            if (instability - before).abs() <= STILL * instability {
+                break;
+            }
         }
     }
     Some((unscaled, instability))
@@ -218,7 +221,7 @@ fn iterate(
     instability: f64,
 ) -> Option<Arrow> {
     let mut covariance = None;
-    for _ in 0..STEPS {
+    for _ in 0..MOST_ROUNDS {
         let now = linearise(sightings, layout, x, reach);
         let sums = now.sums(&layout.shape, instability);
         if !layout.terms.phases && !is_determined(&sums.shared()) {

@@ -9,69 +9,12 @@ use crate::lattice::fit::leverage::Leverage;
 use crate::lattice::fit::model::look;
 use crate::lattice::fit::solve;
 use crate::lattice::fit::tables::Tables;
-use crate::spectrum::harmonics::Harmonics;
-use crate::spectrum::shells::{FIRST_SHELL, shells};
+use crate::spectrum::shells::{FASTEST, FIRST_SHELL, shells};
 
 /// A harmonic of which less than this share is left by those that are fitted cannot be told from them. Chosen by eye.
 const TOLD_APART: f64 = 0.05;
-/// A sketch of a larger share of the lines saves nothing. Chosen by eye.
-const WORTH_A_SKETCH: f64 = 0.3;
-/// Frames with more pixels have many periods. Chosen by eye.
-const MANY_PIXELS: usize = 100_000;
-/// Lines of a sketch: few enough to cost little. Chosen by eye.
-const SKETCHED: usize = 64;
-/// Power over noise of the weakest first harmonic in the lines of a sketch, at least: three times what a lattice
-/// needs to be found.
-const SKETCHABLE: f64 = 60.0;
-/// Multiples of it are spread evenly, modulo 1: the golden ratio.
-const GOLDEN: f64 = 0.618_033_988_749_895;
-/// Largest wave vector, as a share of the Nyquist frequency. Chosen by eye.
-const HIGHEST: f64 = 0.9;
 
 impl Fit<'_> {
-    /// Whether a few lines of the image are enough to get near the end.
-    pub(crate) fn worth_a_sketch(&self, start: &Harmonics) -> bool {
-        let share = SKETCHED as f64 / self.frame.lines().max(1) as f64;
-        let first = start.list.iter().take(FIRST_SHELL.len());
-        let weakest = first
-            .map(|harmonic| harmonic.significance(start.window_sums))
-            .fold(f64::INFINITY, f64::min);
-        share < WORTH_A_SKETCH && share * weakest > SKETCHABLE
-    }
-
-    /// Fits to one line of each of a few stripes. Ends near enough to the lattice of all lines for
-    /// one step.
-    pub(crate) fn sketch(&mut self) -> Option<()> {
-        let whole = self.frame.clone();
-        let count: Vec<usize> = (0..whole.image.rows)
-            .filter(|&r| whole.present[r] > 0)
-            .collect();
-        let stripe = count.len() as f64 / SKETCHED as f64;
-        // At irregular places, lest waves look like others.
-        let places = (0..SKETCHED).map(|i| {
-            let within = (i as f64 * GOLDEN).fract();
-            count[((i as f64 + within) * stripe) as usize]
-        });
-        let mut picked = vec![false; whole.image.rows];
-        for row in places {
-            picked[row] = true;
-        }
-        self.frame.leave_out(|row| !picked[row]);
-        self.converge()?;
-        if self.mind_the_lines() {
-            self.converge()?;
-        }
-        let sigma = self.sigma;
-        let new = self.earned(|_| true, |_, _| Some(sigma * sigma))?;
-        if !new.is_empty() {
-            self.add(new);
-            self.converge()?;
-        }
-        self.frame = whole;
-        self.settled = false;
-        Some(())
-    }
-
     /// Adds harmonics until none earns its place, drops those that lost theirs, and fits anew each
     /// time. Returns the noise that is left.
     pub(crate) fn choose(&mut self) -> Option<FinalNoise> {
@@ -83,14 +26,8 @@ impl Fit<'_> {
                 self.converge()?;
             }
             let noise = self.noise()?;
-            // On large frames, which have many periods, what does not show in the transform of the
-            // residual is not looked at more closely.
-            let all = self.frame.pixels() < MANY_PIXELS;
             let residual = &noise.residual;
-            let new = self.earned(
-                |p| all || residual.is_promising(p),
-                |p, leverage| residual.median_around(p, leverage),
-            )?;
+            let new = self.earned(|p, leverage| residual.median_around(p, leverage))?;
             if new.is_empty() {
                 return self.pruned(noise);
             }
@@ -113,27 +50,24 @@ impl Fit<'_> {
         2.0 * (self.frame.pixels() as f64).ln()
     }
 
-    /// The harmonics outside the model that are `promising` by their wave vector (phase at the edges).
-    fn outside(&self, promising: impl Fn(Vector2<f64>) -> bool) -> Vec<[i32; 2]> {
+    /// The harmonics outside the model that are sampled.
+    fn outside(&self) -> Vec<[i32; 2]> {
         candidates()
             .into_iter()
             .filter(|index| !self.model.basis.indices.contains(index))
             .filter(|&index| {
                 let p = wave(&self.model.pair, index).component_div(&self.frame.edge());
-                p.amax().max(-p.amin()) < HIGHEST * std::f64::consts::PI
+                p.amax().max(-p.amin()) < FASTEST
             })
-            .filter(|&index| promising(wave(&self.model.pair, index)))
             .collect()
     }
 
-    /// The harmonics outside the model that are `promising` by their wave vector (phase at the edges)
-    /// and significant against the `noise` there.
+    /// The harmonics outside the model that are significant against the `noise` there.
     fn earned(
         &mut self,
-        promising: impl Fn(Vector2<f64>) -> bool,
         noise: impl Fn(Vector2<f64>, &Leverage) -> Option<f64>,
     ) -> Option<Vec<[i32; 2]>> {
-        let outside = self.outside(promising);
+        let outside = self.outside();
         if outside.is_empty() {
             return Some(outside);
         }

@@ -23,12 +23,11 @@ use crate::lattice::fit::places::{InPlaces, Places};
 use crate::lattice::fit::straight::Followed;
 use crate::lattice::fit::tables::Tables;
 use crate::lattice::fit::{bend, closure, frame, solve};
+use crate::numbers::MOST_ROUNDS;
 use crate::numbers::dot::dot;
 use crate::spectrum::harmonics::Harmonics;
 use crate::spectrum::shells::FIRST_SHELL;
 
-/// Steps until the fit has to stand still. Chosen by eye.
-const MOST_STEPS: usize = 30;
 /// It stands still when what a step leaves is less than this, all parameters together, in units of their errors,
 /// squared: 0.22 σ.
 const STILL: f64 = 0.05;
@@ -136,7 +135,7 @@ impl<'a> Fit<'a> {
 
     /// Steps until nothing moves any more.
     pub(crate) fn converge(&mut self) -> Option<()> {
-        for _ in 0..MOST_STEPS {
+        for _ in 0..MOST_ROUNDS {
             // The first step of all knows nothing of what is to be cut off.
             let blind = self.sigma.is_infinite();
             let (step, decrement) = self.step()?;

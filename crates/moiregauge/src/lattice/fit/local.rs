@@ -19,6 +19,8 @@
 
 use nalgebra::{Matrix3, Vector2, Vector3};
 
+use crate::numbers::MOST_ROUNDS;
+
 /// One frequency, in whole cycles per frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Bin {
@@ -42,8 +44,6 @@ const EXPONENT: f64 = 1.5;
 const STEP: f64 = 2.0;
 /// Least number of bins for a fit: hardly more than its parameters.
 const FEWEST: f64 = 6.0;
-/// Newton steps, at most. Chosen by eye.
-const ROUNDS: usize = 12;
 
 /// Noise power on the x and on the y component of the wave vector at `k` (cycles per frame), and on the
 /// phase. Line offsets take up the share `lambda` of what whole lines do. `None` where the fit has left
@@ -124,7 +124,7 @@ fn regression(rows: &[(Vector3<f64>, f64, f64)]) -> Option<Vector3<f64>> {
     }
     let prior = Vector3::new(0.0, EXPONENT.powi(-2), STEP.powi(-2)) * CORRELATED;
     let mut b = Vector3::new((found / white).ln(), 0.0, 0.0);
-    for _ in 0..ROUNDS {
+    for _ in 0..MOST_ROUNDS {
         let mut score = -prior.component_mul(&b);
         let mut information = Matrix3::from_diagonal(&prior);
         for (x, power, white) in rows {

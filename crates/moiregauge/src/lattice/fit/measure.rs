@@ -27,15 +27,8 @@ pub(crate) fn measure(
     background: Background,
     displacement: Option<&Departure>,
 ) -> Option<Found> {
-    let new = || {
-        let mut fit = Fit::new(image, start, background)?;
-        fit.frame.displacement = displacement.cloned();
-        Some(fit)
-    };
-    let mut fit = new()?;
-    if fit.worth_a_sketch(start) && fit.sketch().is_none() {
-        fit = new()?;
-    }
+    let mut fit = Fit::new(image, start, background)?;
+    fit.frame.displacement = displacement.cloned();
     let noise = fit.choose()?;
     let followed = without_bend(&mut fit, noise);
     let (lattice, fit) = fit.result(&followed)?;

@@ -16,10 +16,6 @@ use crate::numbers::median::median;
 use crate::spectrum::fourier::wide;
 use crate::spectrum::transform::{Spectrum, hann};
 
-/// Power over noise of the highest bin near a frequency where a harmonic is tried: a third of what the information criterion asks of one.
-const PROMISING: f64 = 4.0;
-/// Bins across the lines on either side of such a frequency from which the noise is taken: half of those around a harmonic.
-const NEAR: i64 = 8;
 /// Bins nearer to zero frequency than this belong to the background: a plane fills the first.
 const BACKGROUND: i64 = 2;
 /// The first column of the spectrum without power of line offsets, which the window spreads over two columns.
@@ -87,25 +83,6 @@ impl ResidualNoise {
             }
         });
         (!all.is_empty()).then(|| median(&mut all) / std::f64::consts::LN_2)
-    }
-
-    /// True if a harmonic may be at this frequency. One that the information criterion accepts has 12 times the noise or more, of
-    /// which window and grid leave a quarter at worst.
-    pub(crate) fn is_promising(&self, p: Vector2<f64>) -> bool {
-        let centre = (p / PI).map(|c| c.round() as i64);
-        let mut near = 0.0f64;
-        let mut around = Vec::new();
-        for dy in -NEAR..=NEAR {
-            for dx in -ALONG..=ALONG {
-                let power = self.power(centre.x + dx, centre.y + dy);
-                if dx.abs().max(dy.abs()) <= 1 {
-                    near = near.max(power);
-                } else {
-                    around.push(power);
-                }
-            }
-        }
-        near > PROMISING * median(&mut around) / std::f64::consts::LN_2
     }
 
     /// Calls `each` with the frequency, the power found and that of white noise.

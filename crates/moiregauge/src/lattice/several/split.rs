@@ -12,13 +12,12 @@ use rustfft::num_complex::Complex64;
 
 use crate::frame::image::Image;
 use crate::lattice::fit::waves::sum;
+use crate::spectrum::select::TOLERANCE;
 
 /// Step of the grid, cycles per frame: a small part of a main lobe, ...
 const STEP: f64 = 0.25;
 /// ... and its reach in steps: 2.5 cycles, a main lobe and a half.
 const REACH: i32 = 10;
-/// Waves nearer than this (cycles per frame) are taken for one: the errors of two grow without limit. Chosen by eye.
-const APART: f64 = 0.6;
 
 /// A lattice to start with: its reciprocal pair (rad per pixel) and what it makes of the image.
 pub(crate) struct Guess {
@@ -75,7 +74,7 @@ fn two_waves(image: &Image, q: Vector2<f64>) -> Option<[Wave; 2]> {
     for (i, a) in places.iter().enumerate() {
         for (j, b) in places.iter().enumerate().skip(i + 1) {
             let apart = (a - b) * STEP;
-            if apart.norm() < APART {
+            if apart.norm() < TOLERANCE {
                 continue;
             }
             let d = sinc(apart.x) * sinc(apart.y);

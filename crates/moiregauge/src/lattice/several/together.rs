@@ -11,11 +11,10 @@ use crate::lattice::measure::measure_whole;
 use crate::lattice::measured::MeasuredLattice;
 use crate::lattice::several::split;
 use crate::lattice::start::Start;
+use crate::numbers::MOST_ROUNDS;
 use crate::spectrum::error::LatticeError;
 use crate::spectrum::method::Method;
 
-/// Rounds of taking turns, at most. Chosen by eye.
-const ROUNDS: usize = 80;
 /// Nothing moves any more: changes below this part of σ. Any small number: each round costs time.
 const STILL: f64 = 0.03;
 /// Signal over noise of the weakest first harmonic of a lattice, at least, when all are taken off: 25 in power, a
@@ -238,7 +237,7 @@ impl Scene<'_> {
 
     /// Fits each anew to what the others leave, until none moves.
     fn take_turns(&self, parts: &mut [Part]) -> Result<(), LatticeError> {
-        for _ in 0..ROUNDS {
+        for _ in 0..MOST_ROUNDS {
             let mut most = 0.0f64;
             for i in 0..parts.len() {
                 let left = self.without(parts, Some(i));
