@@ -4,33 +4,43 @@ use nalgebra::Matrix2;
 
 use crate::explain::normal::{Normal, RIDGE, gains};
 use crate::explain::phases::Phases;
-use crate::explain::scene::Scene;
+use crate::explain::scene::{FOLDS, Scene};
 use crate::frame::background::{Background, remove_background};
 use crate::frame::image::Image;
 use crate::numbers::spread::mean_and_spread;
 use crate::spectrum::shells::{FIRST_SHELL, shells};
 
-/// By how much more of the variance one description predicts than another, block by block.
+/// By how much more of the variance one description predicts than another, block by block, with the fold of each.
 #[derive(Clone, Debug)]
-pub(crate) struct Blocks(Vec<f64>);
+pub(crate) struct Blocks(Vec<(usize, f64)>);
 
 impl Blocks {
     /// Of the gains of two descriptions; blocks of which too little is there are left out.
     pub(crate) fn difference(scene: &Scene, one: &[f64], other: &[f64]) -> Self {
         let power = scene.values.iter().map(|v| v * v).sum::<f64>();
-        let each = one.iter().zip(other).zip(scene.filled());
-        let there = each.filter(|(_, filled)| *filled);
+        let each = one.iter().zip(other).zip(scene.filled()).enumerate();
+        let there = each.filter(|(_, (_, filled))| *filled);
+        let share = |a: &f64, b: &f64| (a - b) / power.max(f64::MIN_POSITIVE);
         Self(
             there
-                .map(|((a, b), _)| (a - b) / power.max(f64::MIN_POSITIVE))
+                .map(|(block, ((a, b), _))| (Scene::fold(block), share(a, b)))
                 .collect(),
         )
     }
 
-    /// The mean over its standard error, which is no less than what the damping of amplitudes leaves of the variance, and rounding.
+    /// The mean over its standard error, by the scatter of blocks or, where they have more in common, of the bands of lines that are held out together.
+    /// The error is no less than what the damping of amplitudes leaves of the variance, and rounding.
     pub(crate) fn standard_errors(&self) -> f64 {
-        let spread = mean_and_spread(&self.0);
-        spread.value / (spread.sigma / (self.0.len() as f64).sqrt()).max(RIDGE * RIDGE)
+        let each: Vec<f64> = self.0.iter().map(|(_, x)| *x).collect();
+        let (n, spread) = (each.len() as f64, mean_and_spread(&each));
+        let mut bands = [None; FOLDS];
+        for (band, x) in &self.0 {
+            *bands[*band].get_or_insert(0.0) += x - spread.value;
+        }
+        let bands: Vec<f64> = bands.into_iter().flatten().collect();
+        let common = mean_and_spread(&bands).sigma * (bands.len() as f64).sqrt() / n;
+        let error = (spread.sigma / n.sqrt()).max(common);
+        spread.value / error.max(RIDGE * RIDGE)
     }
 }
 

@@ -14,8 +14,9 @@ use crate::numbers::widest::widest;
 const BLOCKS: usize = 6;
 /// A block counts with at least the inverse of this fraction of the bins of the fullest.
 const FULL: usize = 4;
-/// Number of groups of blocks that are held out in turn.
-pub(crate) const FOLDS: usize = 4;
+/// Number of groups of blocks that are held out in turn: bands of lines. What the lines of a band have in common (a gain, an offset, noise in time) is
+/// then not seen by what predicts them.
+pub(crate) const FOLDS: usize = BLOCKS;
 /// Bins per shortest period: harmonics of twice the first order keep three bins a period.
 const BINS_PER_PERIOD: f64 = 7.0;
 /// Standard deviation of the Gaussian mean that is subtracted as background, in longest periods: it leaves 98 % of the first order.
@@ -133,9 +134,9 @@ impl Scene {
         Vector2::new(1.0 / self.half.x, 0.0)
     }
 
-    /// The turn in which each block is held out: neighbours in different ones.
-    pub(crate) fn fold(block: usize) -> usize {
-        (block % BLOCKS + 2 * (block / BLOCKS)) % FOLDS
+    /// The turn in which each block is held out.
+    pub(crate) const fn fold(block: usize) -> usize {
+        block / BLOCKS
     }
 
     /// How many blocks there are.

@@ -11,6 +11,7 @@ use crate::explain::scene::{Scene, gaussian_mean};
 use crate::explain::table::table;
 use crate::frame::image::Image;
 use crate::numbers::rng::normals;
+use crate::numbers::spread::mean_and_spread;
 use crate::numbers::three::three;
 
 /// (columns, rows), not square: exchanged axes would show.
@@ -100,6 +101,27 @@ fn every_other_row_belongs_to_the_lattice() {
         let alone = image(1, 0.5, |at| lattice(&fine, at));
         assert_eq!(better_cell(&alone, &fine, false).better, None, "{rows}");
     }
+}
+
+/// Each line has its own gain. That puts power beside the waves of the lattice, where a superlattice has some of its own, but no line tells that of
+/// another: over forty frames the superlattice predicts nothing in the mean, and none of them shows it.
+#[test]
+fn gains_of_lines_make_no_superlattice() {
+    let fine = Matrix2::new(0.7, 0.35, 0.0, 0.61);
+    let coarse = Supercell::Root3.coarse(&fine).unwrap();
+    let of_frame = |seed: u64| {
+        let mut normal = normals(seed, "gains", 0);
+        let gains: Vec<f64> = (0..SIZE[1]).map(|_| 1.0 + 0.35 * normal()).collect();
+        let frame = image(seed, 0.3, |at| gains[at.y as usize] * lattice(&fine, at));
+        match superlattice(&frame, &coarse, Supercell::Root3, false) {
+            Some(Superlattice::NotShown(predicts)) => predicts,
+            other => panic!("{seed}: {other:?}"),
+        }
+    };
+    let all: Vec<f64> = (0..40).map(of_frame).collect();
+    let found = mean_and_spread(&all);
+    let error = found.sigma / (all.len() as f64).sqrt();
+    assert!(found.value < 3.0 * error, "{found:?}");
 }
 
 /// Two descriptions that differ by rounding alone are as good, however small the scatter of their difference.
