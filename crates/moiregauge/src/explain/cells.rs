@@ -1,9 +1,10 @@
 //! Lattices of which one holds the other, compared by what they predict.
 //!
 //! The lattice with the larger cell (a superlattice) has all wave vectors of the other and more between them. It is taken where these predict pixels
-//! that they have not seen, in all three directions, and lie on its points: a second moiré that only comes near them does not belong to it.
+//! that they have not seen, in all directions, and lie on its points: a second moiré that only comes near them does not belong to it.
 
 use std::cell::OnceCell;
+use std::f64::consts::PI;
 
 use heterostrain::lattice::shortest_pair;
 use nalgebra::{Matrix2, Vector2};
@@ -162,7 +163,7 @@ fn predicts_as_well(
 /// What an image shows of the superlattice.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Superlattice {
-    /// Its waves predict, in all three directions, and lie on its points.
+    /// Its waves predict, in all directions that can be told from offsets of lines, and lie on its points.
     Shown,
     /// They predict better by this many standard errors, but by too few, not in all directions, or better still with wave vectors of their own. 0 where
     /// they are not its harmonics.
@@ -188,14 +189,17 @@ pub(crate) fn superlattice(
             .fold(0.0, f64::max);
     let half = (0..=LARGEST).flat_map(|h| (-LARGEST..=LARGEST).map(move |k| [h, k]));
     let half = half.filter(|[h, k]| *h > 0 || *k > 0);
-    let indices: Vec<[i32; 2]> = half
-        .filter(|index| wave(*index).norm() < most.min(LONGEST))
-        .collect();
     let inverse = supercell.names().try_inverse()?;
     let is_fine = |[h, k]: [i32; 2]| {
         let index = inverse * Vector2::new(f64::from(h), f64::from(k));
         (index - index.map(f64::round)).amax() < 1e-6
     };
+    // A wave of less than a cycle along the lines cannot be told from their offsets: where it is not of both lattices it says nothing.
+    let cycle = PI / scene.half.x;
+    let tells = |index: &[i32; 2]| is_fine(*index) || wave(*index).x.abs() > cycle;
+    let indices: Vec<[i32; 2]> = half
+        .filter(|index| wave(*index).norm() < most.min(LONGEST) && tells(index))
+        .collect();
     let scene = scene.without_waves_beside(&coarse, &fine, &indices);
     let lattice = Phases::shown(&scene, coarse, bends);
     let normals = lattice.normals(&scene, &indices);
@@ -213,10 +217,13 @@ pub(crate) fn superlattice(
         Some(errors(&large, &without))
     };
     let predicts = errors(&large, &small);
-    if predicts < BETTER {
+    let first: Vec<[i32; 2]> = FIRST_SHELL
+        .into_iter()
+        .filter(|i| !is_fine(*i) && tells(i))
+        .collect();
+    if predicts < BETTER || first.len() < 2 {
         return Some(Superlattice::NotShown(predicts));
     }
-    let first: Vec<[i32; 2]> = FIRST_SHELL.into_iter().filter(|i| !is_fine(*i)).collect();
     let adds: Option<Vec<f64>> = first.iter().map(adds).collect();
     let least = adds?.into_iter().fold(f64::INFINITY, f64::min);
     if least < 0.0 {
