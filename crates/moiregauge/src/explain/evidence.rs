@@ -7,6 +7,7 @@ use crate::explain::phases::Phases;
 use crate::explain::scene::{FOLDS, Scene};
 use crate::frame::background::{Background, remove_background};
 use crate::frame::image::Image;
+use crate::numbers::chi2::enlargement;
 use crate::numbers::spread::mean_and_spread;
 use crate::spectrum::shells::{FIRST_SHELL, shells};
 
@@ -28,19 +29,21 @@ impl Blocks {
         )
     }
 
-    /// The mean over its standard error, by the scatter of blocks or, where they have more in common, of the bands of lines that are held out together.
-    /// The error is no less than what the damping of amplitudes leaves of the variance, and rounding.
+    /// The mean over its standard error. That is the scatter of blocks, enlarged where bands of lines, which are held out together, scatter significantly
+    /// more. It is no less than what the damping of amplitudes leaves of the variance, and rounding.
     pub(crate) fn standard_errors(&self) -> f64 {
         let each: Vec<f64> = self.0.iter().map(|(_, x)| *x).collect();
-        let (n, spread) = (each.len() as f64, mean_and_spread(&each));
-        let mut bands = [None; FOLDS];
+        let (count, spread) = (each.len() as f64, mean_and_spread(&each));
+        let mut bands = [[0.0; 2]; FOLDS];
         for (band, x) in &self.0 {
-            *bands[*band].get_or_insert(0.0) += x - spread.value;
+            bands[*band][0] += x - spread.value;
+            bands[*band][1] += 1.0;
         }
-        let bands: Vec<f64> = bands.into_iter().flatten().collect();
-        let common = mean_and_spread(&bands).sigma * (bands.len() as f64).sqrt() / n;
-        let error = (spread.sigma / n.sqrt()).max(common);
-        spread.value / error.max(RIDGE * RIDGE)
+        let bands = bands.into_iter().filter(|[_, blocks]| *blocks > 0.0);
+        let bands = bands.map(|[sum, blocks]| sum * sum / (blocks * spread.sigma.powi(2)));
+        let (chi2, bands) = bands.fold((0.0, 0), |(sum, n), band| (sum + band, n + 1_usize));
+        let variance = spread.sigma.powi(2) / count * enlargement(chi2, bands.saturating_sub(1));
+        spread.value / variance.sqrt().max(RIDGE * RIDGE)
     }
 }
 
