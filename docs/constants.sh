@@ -23,7 +23,6 @@ stripes/find APART stripes: half double
 stripes/find SMALLEST stripes: half double
 stripes/nodes CROSSING stripes: half double
 stripes/pilot CARRIED stripes: half double
-campaign/identity SIZE set: half double
 campaign/combine WORSE set: half double
 campaign/atomic LARGEST_ERROR atoms half double
 campaign/atomic LARGEST_DISTORTION atoms half double

@@ -9,7 +9,7 @@ use crate::scan::measured::MeasuredScan;
 use crate::settings::knobs::Grouping;
 
 /// Line rates and sizes that differ by less than this share are the same: headers round them.
-const SAME: f64 = 0.01;
+pub(crate) const SAME: f64 = 0.01;
 
 /// The scans of one set, in order of time; at the end those that repeat others.
 pub(crate) struct Group {

@@ -4,6 +4,7 @@
 //! of equal shape whose values, freed of plane and scale, agree far better than the noise of two scans allows.
 //! Where there is no noise to tell by (simulations), frames of another direction, time or size are other frames.
 
+use crate::campaign::group::SAME;
 use crate::caveat::Caveat;
 use crate::caveat::files::FileDoubt;
 use crate::scan::measured::{MeasuredLine, MeasuredScan};
@@ -16,8 +17,6 @@ const OF_NOISE: f64 = 0.2;
 const CERTAIN: f64 = 0.05;
 /// … and the noise has to be this share of the image: it is no rounding then and no misfit of the lattice.
 const NOISY: f64 = 0.02;
-/// Sizes that differ by more are different. Chosen by eye.
-const SIZE: f64 = 0.01;
 
 /// Noise of a pixel in standard deviations of the image: the lesser of what its neighbours and the first harmonics of
 /// the fit see. What the sample shows beside the lattice is in the latter.
@@ -65,7 +64,7 @@ fn said_to_differ(a: &MeasuredScan, b: &MeasuredScan) -> bool {
     let sizes = a.size_nm.zip(b.size_nm);
     let other_size = |(a, b): ([f64; 2], [f64; 2])| {
         let mut sides = a.iter().zip(b);
-        sides.any(|(a, b)| (a - b).abs() > SIZE * b)
+        sides.any(|(a, b)| (a - b).abs() > SAME * b)
     };
     other(a.frame_direction, b.frame_direction)
         || other(a.acquired, b.acquired)

@@ -28,8 +28,7 @@ const LONGEST: f64 = 2.1;
 /// Standard errors by which a better description predicts more. Larger cells that were there gained 10 and more, those that were
 /// not at most 2.7 (simulated frames of two generators, lines with gains among them).
 pub(crate) const BETTER: f64 = 4.0;
-/// Standard errors that the waves in each direction of a larger cell add, at least, and that wave vectors of their own do not: what chance makes. Of half-order
-/// waves in one direction the other directions add none.
+/// Standard errors that the waves in each direction of a larger cell add, at least: more than chance. Of half-order waves in one direction the others add none.
 const EACH: f64 = 1.0;
 /// The smaller cell is taken if it predicts this fraction of what the larger does: the larger one has waves that are not its own.
 pub(crate) const MOST: f64 = 0.5;
@@ -258,7 +257,7 @@ pub(crate) fn superlattice(
     let by = errors(&beside, &large);
     Some(if by > BETTER {
         Superlattice::NotShown(0.0)
-    } else if least > EACH && by < EACH {
+    } else if least > EACH && by <= BETTER / 2.0 {
         Superlattice::Shown
     } else {
         Superlattice::NotShown(predicts)

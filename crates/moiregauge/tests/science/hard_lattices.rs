@@ -243,7 +243,8 @@ fn images_of_a_set_agree_on_a_first_shell() {
         assert_eq!(analysis.sets.len(), 1, "{seed}");
         let twist = analysis.sets[0].mean.as_ref().unwrap().twist();
         let off = (twist.value.to_degrees() - truth).abs();
-        if off < 0.001 {
+        // The harmonic shell is off by a factor of √3.
+        if off < 0.01 * truth {
             assert!(off < 5.0 * twist.statistical.to_degrees(), "{seed}: {off}");
             right += 1;
         } else {
