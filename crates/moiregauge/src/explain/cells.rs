@@ -254,7 +254,7 @@ pub(crate) fn superlattice(
     let normals = own.normals(&scene, &others);
     let all: Vec<usize> = (0..2 * (others.len() + first.len())).collect();
     let beside = gains(&normals, &all)?;
-    let by = errors(&beside, &large);
+    let by = Blocks::difference(&scene, &beside, &large).by_blocks();
     Some(if by > BETTER {
         Superlattice::NotShown(0.0)
     } else if least > EACH && by <= BETTER / 2.0 {

@@ -1,5 +1,6 @@
 //! Evidence for a lattice: what it predicts, and what each family of its waves adds to that.
 
+use heterostrain::Estimate;
 use nalgebra::Matrix2;
 
 use crate::explain::normal::{Normal, RIDGE, gains};
@@ -32,8 +33,22 @@ impl Blocks {
     /// The mean over its standard error. That is the scatter of blocks, enlarged where bands of lines, which are held out together, scatter significantly
     /// more. It is no less than what the damping of amplitudes leaves of the variance, and rounding.
     pub(crate) fn standard_errors(&self) -> f64 {
-        let each: Vec<f64> = self.0.iter().map(|(_, x)| *x).collect();
-        let (count, spread) = (each.len() as f64, mean_and_spread(&each));
+        self.by_blocks() / self.enlargement().sqrt()
+    }
+
+    /// The same by the scatter of blocks alone: for a doubt, where too large an error would hide it.
+    pub(crate) fn by_blocks(&self) -> f64 {
+        let spread = self.spread();
+        spread.value / (spread.sigma / (self.0.len() as f64).sqrt()).max(RIDGE * RIDGE)
+    }
+
+    fn spread(&self) -> Estimate {
+        mean_and_spread(&self.0.iter().map(|(_, x)| *x).collect::<Vec<f64>>())
+    }
+
+    /// By what factor bands scatter more, as variances.
+    fn enlargement(&self) -> f64 {
+        let spread = self.spread();
         let mut bands = [[0.0; 2]; FOLDS];
         for (band, x) in &self.0 {
             bands[*band][0] += x - spread.value;
@@ -42,8 +57,7 @@ impl Blocks {
         let bands = bands.into_iter().filter(|[_, blocks]| *blocks > 0.0);
         let bands = bands.map(|[sum, blocks]| sum * sum / (blocks * spread.sigma.powi(2)));
         let (chi2, bands) = bands.fold((0.0, 0), |(sum, n), band| (sum + band, n + 1_usize));
-        let variance = spread.sigma.powi(2) / count * enlargement(chi2, bands.saturating_sub(1));
-        spread.value / variance.sqrt().max(RIDGE * RIDGE)
+        enlargement(chi2, bands.saturating_sub(1))
     }
 }
 
