@@ -65,14 +65,6 @@ def test_a_quiet_cluster_is_one_of_settings_that_there_are() -> None:
         assert dask.config.get(name, None) not in (None, value), name
 
 
-def test_scheduler_and_client_take_less_than_a_twentieth() -> None:
-    """Of the processor time, with fewer sets than the ten thousand that the script takes by itself."""
-    pytest.importorskip("distributed")
-    script = Path(__file__).resolve().parent.parent / "measure" / "many_sets.py"
-    done = subprocess.run([sys.executable, script, "500"], capture_output=True, text=True, timeout=400, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-
-
 # What a notebook of the user's does, in a process of its own.
 RUN = """
 import sys

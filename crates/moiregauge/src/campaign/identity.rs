@@ -5,6 +5,7 @@
 //! Where there is no noise to tell by (simulations), frames of another direction, time or size are other frames.
 
 use crate::campaign::group::SAME;
+use crate::campaign::shells::counts;
 use crate::caveat::Caveat;
 use crate::caveat::files::FileDoubt;
 use crate::scan::measured::{MeasuredLine, MeasuredScan};
@@ -85,9 +86,7 @@ fn knowledge(scan: &MeasuredScan) -> [usize; 4] {
 
 /// Marks the scans that repeat another one, which is used: each frame counts once.
 pub(crate) fn mark_repeats(scans: &mut [MeasuredScan], caveats: &mut Vec<Caveat>) {
-    let mut order: Vec<usize> = (0..scans.len())
-        .filter(|&i| scans[i].excluded.is_none())
-        .collect();
+    let mut order: Vec<usize> = (0..scans.len()).filter(|&i| counts(&scans[i])).collect();
     order.sort_by_key(|&i| std::cmp::Reverse(knowledge(&scans[i])));
     let mut kept: Vec<usize> = Vec::new();
     for i in order {

@@ -50,7 +50,7 @@ pub(crate) fn agree(groups: &mut [Group], caveats: &mut Vec<Caveat>) {
 }
 
 /// Whether a scan is one that only its lines may have put out.
-fn counts(scan: &MeasuredScan) -> bool {
+pub(crate) fn counts(scan: &MeasuredScan) -> bool {
     let other = |reason: &String| reason != LineDifference::OTHER_LATTICES;
     scan.repeats.is_none() && !scan.excluded.as_ref().is_some_and(other)
 }

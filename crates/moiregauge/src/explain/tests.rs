@@ -124,6 +124,26 @@ fn gains_of_lines_make_no_superlattice() {
     assert!(found.value < 3.0 * error, "{found:?}");
 }
 
+/// Waves that stand along the slow axis have less than a cycle along the lines: offsets of the lines look the same. They neither make a superlattice nor
+/// hide one, which has waves in other directions.
+#[test]
+fn offsets_of_lines_say_nothing_of_a_superlattice() {
+    let coarse = Matrix2::new(0.62, 0.62, -0.36, 0.36);
+    let fine = Supercell::Root3.fine(&coarse);
+    for seed in 0..10 {
+        for first in [0.0, 0.1] {
+            let mut normal = normals(seed, "offsets", 0);
+            let offsets: Vec<f64> = (0..SIZE[1]).map(|_| normal()).collect();
+            let value = |at: Vector2<f64>| {
+                offsets[at.y as usize] + lattice(&fine, at) + first * lattice(&coarse, at)
+            };
+            let found = superlattice(&image(seed, 0.3, value), &coarse, Supercell::Root3, false);
+            let shown = found.unwrap() == Superlattice::Shown;
+            assert_eq!(shown, first > 0.0, "{seed}: {found:?}");
+        }
+    }
+}
+
 /// Two descriptions that differ by rounding alone are as good, however small the scatter of their difference.
 #[test]
 fn rounding_decides_nothing() {

@@ -25,8 +25,8 @@ use crate::spectrum::transform::Spectrum;
 /// A lattice without a significant first order is accepted if the weakest family of its harmonics predicts held-out pixels by this many standard
 /// errors. The best of 57 candidates in a rough background had 3.4.
 const BEYOND_DOUBT: f64 = 5.0;
-/// Smallest significance of the prediction, standard errors. True lattices had at least 2.3 (60 sets with one to four defects; the smallest is of one that
-/// covers half the frame and fades), single steps at most 0.
+/// Smallest significance of the prediction, standard errors. Accepted lattices of 120 sets with one to four defects had at least 1.6 (the three
+/// below 2 were right), single steps at most 0.
 pub(crate) const LEAST: f64 = 1.5;
 /// Largest relative change of the waves from corner to corner: gradients and waves of twist and strain make up
 /// to a tenth, creep in a frame of four periods of atoms a half, and holes that pass for a coarse lattice 0.7 to 1.4.

@@ -256,6 +256,28 @@ fn images_of_a_set_agree_on_a_first_shell() {
     assert!(split >= 2 && right >= 2, "{split}, {right}");
 }
 
+/// Trace and retrace of a frame show different cells. A copy of it under another name tells nothing new: neither the frame alone nor the frame and
+/// its copy have a mean, and the copy is named once.
+#[test]
+fn a_copy_of_a_frame_whose_lines_disagree_counts_once() {
+    let (simulator, _) = varied("second-shell+edge", 192, 6);
+    let settings = undrawn();
+    let scan = simulator.frame(0);
+    let of = |name: &str| measure_scan(name, &scan, &settings, None).unwrap();
+    for copies in [0, 1] {
+        let mut measured = vec![of("one.spm")];
+        measured.extend((0..copies).map(|_| of("two.spm")));
+        let analysis = analyse(measured, &settings);
+        assert!(analysis.sets.iter().all(|set| set.mean.is_none()));
+        let count = |code: &str| {
+            let codes = analysis.caveats.iter().map(moiregauge::Caveat::code);
+            codes.filter(|found| *found == code).count()
+        };
+        assert_eq!(count("same-scan-twice"), copies);
+        assert_eq!(count("shell-for-lattice"), 1, "{copies}");
+    }
+}
+
 /// Two samples of which one has the points of the other, with a third of its cell: no image of the smaller one has a first shell of the other, and
 /// which is meant nobody knows.
 #[test]
