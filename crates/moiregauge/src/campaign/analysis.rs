@@ -10,16 +10,12 @@ use heterostrain::strain::{
 use nalgebra::{Matrix2, Vector2};
 use spmfile::{DateTime, FrameDirection, LineDirection};
 
-use crate::campaign::set::assumed::AssumedDrift;
-use crate::campaign::set::bare::SetLattice;
+use crate::campaign::means::{Checks, Combined, Residual, SetLattice, SetMean};
+use crate::campaign::motion::{Drift, Motion};
 use crate::caveat::Caveat;
 use crate::coverage::{Change, LatticeRegion};
-use crate::drift::drawn::DriftMonteCarlo;
-use crate::drift::joint::found::TestedTerm;
-use crate::drift::joint::path::DriftPath;
 use crate::frame::axis::Axis;
 use crate::lattice::Evidence;
-use crate::meaning::budget::Budget;
 use crate::meaning::readings::Readings;
 use crate::meaning::tensor::SenseReading;
 use crate::scan::picture::{Illustration, Picture};
@@ -174,155 +170,6 @@ impl Ruled {
     }
 }
 
-/// Errors from the scatter of the scans, to compare with those that are stated.
-#[derive(Clone, Debug)]
-#[non_exhaustive]
-pub struct Checks {
-    /// From leaving out one scan at a time (jackknife); `None` for fewer than four scans.
-    pub leave_one_out: Option<Scatter>,
-    /// From a bootstrap over pairs of up and down scans; `None` for fewer than four pairs.
-    pub bootstrap: Option<Scatter>,
-}
-
-/// One standard deviation of each quantity.
-#[derive(Clone, Copy, Debug)]
-#[non_exhaustive]
-pub struct Scatter {
-    /// Drift velocity along x and y, nm/s.
-    pub drift: [f64; 2],
-    /// θ, rad.
-    pub twist: f64,
-    /// Components of the strain vector.
-    pub strain: [f64; 2],
-}
-
-/// How a scan lies against the fit of all others of its set.
-#[derive(Clone, Copy, Debug)]
-#[non_exhaustive]
-pub struct Residual {
-    /// χ² of its wave vectors and phases against what the others predict.
-    pub chi2: f64,
-    /// Degrees of freedom of `chi2`.
-    pub degrees_of_freedom: usize,
-    /// Probability of so large a χ² by chance, relative to that of the other scans if this exceeds 1.
-    pub p_value: f64,
-    /// Where the scan stands from where the others have it, nm; `None` without linked phases.
-    pub displacement: Option<Vector2<f64>>,
-    /// Whether it stands out: p < 0.001 divided by the number of scans.
-    pub outlying: bool,
-}
-
-/// One lattice for several scans.
-#[derive(Clone, Debug)]
-pub struct SetMean {
-    /// Lattice vectors, nm.
-    pub lattice: Lattice,
-    /// Twist and strain of that lattice.
-    pub twist_strain: TwistStrain,
-    /// What contributes to their uncertainty, calibration and model included.
-    pub budget: Budget,
-    /// The drift that was assumed where the scans do not tell it; `None` where it was measured or given.
-    pub assumed: Option<AssumedDrift>,
-    /// What else the lattice can mean.
-    pub readings: Readings,
-    /// Standard deviation of the twist over the scans, rad; NaN for a single scan.
-    pub twist_scatter: f64,
-    /// Root-mean-square deviation per component of the strain vector over the scans; NaN for one scan.
-    pub strain_scatter: f64,
-    /// χ² per degree of freedom of the scans against the common lattice; `None` for one image, which has nothing to differ from.
-    pub chi2_per_dof: Option<f64>,
-    /// Factor by which all variances were enlarged for that scatter; 1 where it is not significant.
-    pub enlargement: f64,
-    /// Whether each scan's wavelengths lie within ±1 % of the common ones.
-    pub within_one_percent: bool,
-}
-
-/// All sets taken together.
-#[derive(Clone, Debug)]
-pub struct Combined {
-    /// Weighted mean lattice, nm.
-    pub lattice: Lattice,
-    /// Its twist and strain.
-    pub twist_strain: TwistStrain,
-    /// What contributes to their uncertainty, calibration and model included.
-    pub budget: Budget,
-    /// What else the lattice can mean.
-    pub readings: Readings,
-    /// Whether one joint fit over all scans made them, and with which terms.
-    pub joint: Option<JointTerms>,
-    /// The drift in the middle of the campaign, where one joint fit over all scans describes it.
-    pub drift: Option<Drift>,
-    /// The way of the sample by the fit over all scans, where that made them.
-    pub path: Option<DriftPath>,
-    /// What the scans themselves say of the errors.
-    pub checks: Option<Checks>,
-    /// How far every two sets are apart.
-    pub consistency: Vec<Consistency>,
-}
-
-/// How many standard deviations lie between two sets.
-#[derive(Clone, Debug)]
-pub struct Consistency {
-    /// Names of the two sets.
-    pub sets: [String; 2],
-    /// Difference of the drift velocities: square root of χ² for two components; `None` where unknown.
-    pub drift_sigmas: Option<f64>,
-    /// Difference of the twist angles in units of its σ.
-    pub twist_sigmas: f64,
-    /// Difference of the strain vectors: square root of χ² for two components.
-    pub strain_sigmas: f64,
-}
-
-/// Motion of the sample in the frame of the sensors.
-#[derive(Clone, Debug)]
-pub struct Drift {
-    /// Velocity, nm/s.
-    pub velocity: Vector2<f64>,
-    /// Its covariance, (nm/s)².
-    pub covariance: Matrix2<f64>,
-    /// Whether the user gave it (from an earlier calibration).
-    pub given: bool,
-    /// Quality of the fit; `None` for a given drift.
-    pub fit: Option<DriftFit>,
-    /// The Monte Carlo distribution; `None` for a given drift or where no draws were asked for.
-    pub monte_carlo: Option<DriftMonteCarlo>,
-    /// What the joint fit found beside a constant drift; `None` for other methods.
-    pub joint: Option<JointTerms>,
-}
-
-/// The terms of a joint fit that earned their place, and what they came to.
-#[derive(Clone, Debug)]
-#[non_exhaustive]
-pub struct JointTerms {
-    /// Whether phases link the frames.
-    pub phases: bool,
-    /// Change of the drift velocity, nm/s².
-    pub acceleration: Option<Vector2<f64>>,
-    /// Time constant of an exponential settling, s.
-    pub settling_s: Option<f64>,
-    /// Relative gain error of the fast axis.
-    pub fast_gain: Option<Estimate>,
-    /// Scatter of the positions about the fit beyond the noise of the phases, nm.
-    pub instability_nm: f64,
-    /// The terms that were tried, and their information criteria.
-    pub tested: Vec<TestedTerm>,
-}
-
-/// How well the scans determine the drift.
-#[derive(Clone, Debug)]
-pub struct DriftFit {
-    /// Rank of the six-parameter problem (two lattice vectors and the drift).
-    pub rank: usize,
-    /// Condition number of its column-scaled design matrix.
-    pub condition: f64,
-    /// Weighted sum of squared residuals.
-    pub chi2: f64,
-    /// Degrees of freedom of `chi2`.
-    pub degrees_of_freedom: usize,
-    /// The published estimate for comparison: approximate matrices, successive scans compared, nm/s.
-    pub paper_velocity: Option<Vector2<f64>>,
-}
-
 /// One frame: its geometry, lattice, twist and strain.
 #[derive(Clone, Debug)]
 pub struct ScanAnalysis {
@@ -362,16 +209,6 @@ pub struct ScanAnalysis {
     pub residual: Option<Residual>,
     /// Why it was not used for the results of its set; `None` where it was.
     pub excluded: Option<String>,
-}
-
-/// When a frame was taken, and where the sample was.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct Motion {
-    /// Time of the middle of the frame, s from an origin that all scans share.
-    pub middle: f64,
-    /// The way of the sample, by the fit of all sets where there is one, otherwise by that of its set.
-    pub path: DriftPath,
 }
 
 /// What one line direction of a frame gave.

@@ -20,15 +20,15 @@ use spmfile::{FrameDirection, LineDirection};
 use crate::calibration::curvature::SeenBySet;
 use crate::calibration::{Calibration, Coordinates, Curvature, KnownLattice, Shown, shown};
 use crate::campaign::alike::{Alike, alike};
-use crate::campaign::atomic::AMBIGUOUS;
+use crate::campaign::calibrate_doubts::{
+    CalibrateError, about_differences, about_drift, about_name, about_plausibility, about_scatter,
+};
 use crate::campaign::curvature::seen_by_set;
 use crate::campaign::group::{Group, groups};
 use crate::campaign::identity::once;
-use crate::caveat::calibrating::CalibrationDoubt;
 use crate::caveat::drifting::DriftDoubt;
 use crate::caveat::lattices::LatticeDoubt;
 use crate::caveat::positions::PositionDoubt;
-use crate::caveat::sets::{Scattered, SetDoubt};
 use crate::caveat::{Caveat, Doubt};
 use crate::drift::linear::{Observation, common_lattice, solve};
 use crate::frame::axis::Axis;
@@ -44,8 +44,6 @@ const SAME: f64 = 0.35;
 const LARGEST_MISFIT: f64 = 0.05;
 /// A drift of this share of the speed of the slow axis deserves a word. Chosen by eye.
 const LARGE_DRIFT: f64 = 0.2;
-/// χ²/dof of a set or between sets beyond which its scatter deserves a word: errors wrong by 1.4.
-const LARGE_CHI2: f64 = 2.0;
 
 /// What scans of a known lattice say about the scanner.
 #[derive(Clone, Debug)]
@@ -90,41 +88,6 @@ pub struct CalibratedSet {
     pub drift: Option<[Estimate; 2]>,
     /// Whether it was used: frames of one direction are not, where there is better.
     pub used: bool,
-}
-
-/// Why scans give no calibration.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum CalibrateError {
-    /// Nothing to measure.
-    #[error("no scan can be used")]
-    Nothing,
-    /// A cell without area.
-    #[error(
-        "the known lattice has no area: expected two lengths > 0 and an angle between 0° and 180°"
-    )]
-    Cell,
-    /// Sensors in some scans only.
-    #[error(
-        "some scans have position sensors and some have not. Calibrate them in two runs: a calibration holds for one \
-         kind only"
-    )]
-    Mixed,
-    /// Frames up and down that contradict each other.
-    #[error(
-        "{set}: with no constant drift do the frames up and down show the same lattice (they differ by \
-         {misfit_percent:.0} %). Either one of them shows another lattice, or the drift changed or was too large \
-         within a frame. Scan faster lines or smaller frames"
-    )]
-    Drift {
-        /// The set.
-        set: String,
-        /// What the best drift leaves, as a share of the lattice vectors, per cent.
-        misfit_percent: f64,
-    },
-    /// The vectors of a set cannot be used.
-    #[error("{0}: the lattice of these scans cannot be compared with the known one")]
-    Lattice(String),
 }
 
 /// One set on the way.
@@ -419,69 +382,4 @@ fn summary(used: bool, seen: Seen, map: &Matrix2<f64>, coordinates: Coordinates)
         }),
         used,
     }
-}
-
-/// Whether a scanner can be like that.
-fn about_plausibility(calibration: &Calibration, known: bool, caveats: &mut Vec<Caveat>) {
-    if let Some(problem) = calibration.problem() {
-        caveats.push(Caveat::new(
-            CalibrationDoubt::Implausible { reason: problem },
-            "calibration",
-        ));
-    } else if let Some(what) = calibration.unusual().filter(|_| known) {
-        caveats.push(Caveat::new(
-            CalibrationDoubt::Unusual { what },
-            "calibration",
-        ));
-    }
-}
-
-/// Whether the sets scatter more than their errors say.
-fn about_differences(chi2: f64, freedom: usize, caveats: &mut Vec<Caveat>) {
-    if freedom > 0 && chi2 / freedom as f64 > LARGE_CHI2 {
-        let times = (chi2 / freedom as f64).sqrt();
-        let doubt = CalibrationDoubt::SetsDiffer { times };
-        caveats.push(Caveat::new(doubt, "calibration"));
-    }
-}
-
-fn about_scatter(name: &str, chi2: f64, freedom: usize, caveats: &mut Vec<Caveat>) {
-    if freedom > 0 && chi2 / freedom as f64 > LARGE_CHI2 {
-        caveats.push(Caveat::new(
-            SetDoubt::Scatter {
-                of: Scattered::KnownLattice,
-                chi2_per_dof: chi2 / freedom as f64,
-                share: None,
-            },
-            name,
-        ));
-    }
-}
-
-fn about_name(name: &str, found: &Shown, caveats: &mut Vec<Caveat>) {
-    if found.next_distortion < found.distortion + AMBIGUOUS {
-        caveats.push(Caveat::new(
-            CalibrationDoubt::Ambiguous {
-                distortion: found.distortion,
-                next: found.next_distortion,
-            },
-            name,
-        ));
-    }
-}
-
-/// Frames of one direction: what drift may have done.
-fn about_drift(
-    name: &str,
-    gradient: Option<Vector2<f64>>,
-    drift_sigma: f64,
-    caveats: &mut Vec<Caveat>,
-) {
-    caveats.push(Caveat::new(
-        CalibrationDoubt::DriftNotSeparated {
-            gradient: gradient.map(|u| u.norm()),
-            sigma: drift_sigma,
-        },
-        name,
-    ));
 }

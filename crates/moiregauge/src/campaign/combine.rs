@@ -3,9 +3,9 @@
 use heterostrain::lattice::Lattice;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
-use crate::campaign::analysis::{
-    Checks, Combined, Consistency, Drift, JointTerms, Ruled, SetAnalysis, SetMean,
-};
+use crate::campaign::analysis::{Ruled, SetAnalysis};
+use crate::campaign::means::{Checks, Combined, Consistency, SetMean};
+use crate::campaign::motion::{Drift, JointTerms};
 use crate::campaign::set::common::common;
 use crate::campaign::set::joint::{checks as set_checks, joint_fit, lattice_of, terms};
 use crate::campaign::set::moire::moire;

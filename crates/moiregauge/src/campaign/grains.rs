@@ -5,8 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use heterostrain::lattice::{Lattice, labelled_like};
 
-use crate::campaign::analysis::{Analysis, Drift, SetAnalysis};
+use crate::campaign::analysis::{Analysis, SetAnalysis};
 use crate::campaign::combine::SAME_LATTICE;
+use crate::campaign::motion::Drift;
 use crate::caveat::lattices::LatticeDoubt;
 use crate::caveat::sets::SetDoubt;
 use crate::caveat::{Caveat, Doubt};

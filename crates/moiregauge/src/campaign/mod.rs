@@ -8,12 +8,15 @@ pub(crate) mod analyse;
 pub(crate) mod analysis;
 pub(crate) mod atomic;
 pub(crate) mod calibrate;
+pub(crate) mod calibrate_doubts;
 pub(crate) mod combine;
 pub(crate) mod curvature;
 pub(crate) mod grains;
 pub(crate) mod group;
 pub(crate) mod identity;
 pub(crate) mod illustrate;
+pub(crate) mod means;
+pub(crate) mod motion;
 pub(crate) mod naming;
 pub(crate) mod samples;
 pub(crate) mod set;
@@ -21,16 +24,15 @@ pub(crate) mod shells;
 pub(crate) mod sightings;
 pub(crate) mod totals;
 
+pub use crate::caveat::drifting::AssumedDrift;
 pub use analyse::{analyse, is_nothing_left, refusal};
-pub use analysis::{
-    Analysis, AtomicOrientation, Checks, Combined, Consistency, Drift, DriftFit, JointTerms,
-    LineAnalysis, Motion, Residual, Ruled, ScanAnalysis, Scatter, SetAnalysis, SetMean,
-};
+pub use analysis::{Analysis, AtomicOrientation, LineAnalysis, Ruled, ScanAnalysis, SetAnalysis};
 pub use atomic::{AtomicError, atomic_orientation};
-pub use calibrate::{CalibrateError, Calibrated, CalibratedSet, calibrate};
+pub use calibrate::{Calibrated, CalibratedSet, calibrate};
+pub use calibrate_doubts::CalibrateError;
 pub use grains::grains;
 pub use group::natural_order;
 pub use identity::about_repeat;
 pub use illustrate::{amplitude_of, illustrate, picture};
-pub use set::assumed::AssumedDrift;
-pub use set::bare::SetLattice;
+pub use means::{Checks, Combined, Consistency, Residual, Scatter, SetLattice, SetMean};
+pub use motion::{Drift, DriftFit, JointTerms, Motion};

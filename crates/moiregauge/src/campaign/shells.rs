@@ -5,7 +5,7 @@ use crate::caveat::files::FileDoubt;
 use crate::caveat::lattices::LineDifference;
 use crate::caveat::sets::SetDoubt;
 use crate::caveat::{Caveat, Doubt};
-use crate::explain::cells::BETTER;
+use crate::explain::evidence::BETTER;
 use crate::scan::doubts::lines_disagree;
 use crate::scan::measure::{about_lattice, share_noise};
 use crate::scan::measured::{MeasuredLine, MeasuredScan};

@@ -4,7 +4,8 @@ use heterostrain::lattice::Lattice;
 use heterostrain::strain::TwistStrain;
 use heterostrain::{Estimate, TotalEstimate};
 
-use crate::campaign::analysis::{Combined, Drift, SetMean};
+use crate::campaign::means::{Combined, SetMean};
+use crate::campaign::motion::Drift;
 use crate::meaning::budget::{Budget, scanner_covariance};
 use crate::settings::knobs::Settings;
 

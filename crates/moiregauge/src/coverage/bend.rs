@@ -8,20 +8,18 @@
 //! # References
 //! Schwarz, Ann. Stat. 6, 461 (1978), BIC; Eilers and Marx, Statistical Science 11, 89 (1996), splines.
 
-use std::borrow::Cow;
-
 use heterostrain::lattice::{Px, Waves};
 use nalgebra::{DMatrix, Matrix2, Matrix3, Matrix4, Vector2, Vector4};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::coverage::cells::Cells;
-use crate::coverage::choose::{Chosen, choose, choose_change};
+use crate::coverage::choose::{ChangeModel, Chosen, choose, choose_change};
 use crate::coverage::higher;
 use crate::coverage::hollows::hollows;
 use crate::coverage::nodes::{Node, View, nodes};
-use crate::coverage::patch::{LatticeRegion, WHOLE};
+use crate::coverage::patch::LatticeRegion;
 use crate::coverage::phases::{Fit, fit, powers, rows};
+use crate::coverage::slopes::{Slopes, area, slopes};
 use crate::coverage::windows::straightened;
 use crate::numbers::exact;
 use crate::numbers::three::three;
@@ -55,19 +53,6 @@ pub struct Change {
     /// the fit to the pixels says that the lattice changes.
     #[serde(with = "exact")]
     pub evidence: f64,
-}
-
-/// What describes the phases of a lattice that changes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[non_exhaustive]
-pub enum ChangeModel {
-    /// The wave vectors change evenly across the patch.
-    Even,
-    /// The phases are cubic polynomials.
-    Cubic,
-    /// Any smooth variation, on a number of cells along columns and rows.
-    Smooth([usize; 2]),
 }
 
 /// The mean of a lattice over its patch.
@@ -196,69 +181,6 @@ pub(crate) fn described_as_straight(patch: &LatticeRegion, nodes: &[Node]) -> Op
     let fit = fit(powers(patch, 1), nodes)?;
     let straight = fit.left < LEFT;
     straight.then_some([fit.chi2, fit.coefficients.len() as f64, fit.independent])
-}
-
-/// The slopes of ψ₁ and ψ₂ over a patch.
-struct Slopes {
-    /// Their means as sums over the coefficients, a row each.
-    sums: DMatrix<f64>,
-    /// Their means, a column each.
-    mean: Matrix2<f64>,
-    /// Those of each cell, with its pixels.
-    local: Vec<(f64, Matrix2<f64>)>,
-    /// Pixels of the patch.
-    pixels: f64,
-}
-
-/// The cells of which the mean is told: those of the patch; all where it is everywhere but for small gaps.
-fn area<'a>(cells: &Cells, patch: &'a LatticeRegion) -> Cow<'a, [bool]> {
-    if patch.share > WHOLE {
-        cells.counts().iter().map(|count| *count > 0.0).collect()
-    } else {
-        Cow::Borrowed(&patch.inside)
-    }
-}
-
-fn slopes(fit: &Fit, cells: &Cells, patch: &LatticeRegion) -> Slopes {
-    let n = fit.basis.len();
-    let inside = area(cells, patch);
-    let lines = (0..cells.size[1]).into_par_iter().map(|row| {
-        let mut sums = DMatrix::zeros(4, fit.coefficients.len());
-        let (mut local, mut functions) = (Vec::new(), Vec::new());
-        let first = row * cells.size[0];
-        for cell in (first..first + cells.size[0]).filter(|&c| inside[c]) {
-            let count = cells.counts()[cell];
-            let mut slopes = Matrix2::zeros();
-            fit.basis.put(cells.middle_of(cell), &mut functions);
-            for &(i, [_, along, across]) in &functions {
-                for wave in 0..2 {
-                    let c = fit.coefficients[wave * n + i];
-                    for (axis, slope) in [along, across].into_iter().enumerate() {
-                        sums[(2 * wave + axis, wave * n + i)] += count * slope;
-                        slopes[(axis, wave)] += c * slope;
-                    }
-                }
-            }
-            local.push((count, slopes));
-        }
-        (sums, local)
-    });
-    let lines: Vec<_> = lines.collect();
-    let mut sums = DMatrix::zeros(4, fit.coefficients.len());
-    let mut local = Vec::with_capacity(cells.len());
-    for (of_line, cells) in lines {
-        sums += of_line;
-        local.extend(cells);
-    }
-    let pixels = local.iter().map(|(count, _)| count).sum::<f64>();
-    sums /= pixels;
-    let mean = &sums * &fit.coefficients;
-    Slopes {
-        mean: Matrix2::from_column_slice(mean.as_slice()),
-        sums,
-        local,
-        pixels,
-    }
 }
 
 /// By how much the mean `step` (ψ₁ and ψ₂, a column each) would differ with another choice.

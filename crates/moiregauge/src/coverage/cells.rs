@@ -3,13 +3,14 @@
 //! `a(r) = Σ g(n − r) I(n) e^{−iq·n} / Σ g(n − r)` over the pixels n that are there. Sums over the pixels of a cell
 //! come first, then the window on the cells, which are few.
 
-use std::ops::{AddAssign, Div, Mul};
+use std::ops::Div;
 
 use heterostrain::lattice::reciprocal;
-use nalgebra::{Matrix2, SVector, Vector2};
+use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 
+use crate::coverage::summed::{FEWEST, Nine, Summed, smoothed, together, under};
 use crate::frame::image::Image;
 use crate::numbers::widest::widest;
 
@@ -17,9 +18,6 @@ use crate::numbers::widest::widest;
 const CELLS_PER_PERIOD: f64 = 4.0;
 /// Reach of a window, widths: the rest is a thousandth.
 const REACH: f64 = 3.0;
-
-/// Cells that a thread takes at once, at least: fewer are not worth handing out.
-const FEWEST: usize = 4096;
 
 /// Lines of cells in a band.
 const BAND: usize = 128;
@@ -168,11 +166,11 @@ impl Cells {
                 .collect::<Vec<f64>>()
         });
         let squares = [0, 1].map(|axis| taps[axis].iter().map(|t| t * t).collect::<Vec<f64>>());
-        let weight = self.smoothed(&self.count, &taps);
+        let weight = smoothed(self.size, &self.count, &taps);
         let whole = (self.pixels[0] * self.pixels[1]) as f64
             * taps.iter().map(|t| t.iter().sum::<f64>()).product::<f64>();
         Window {
-            noise: (self.smoothed(&self.count, &squares).iter())
+            noise: (smoothed(self.size, &self.count, &squares).iter())
                 .zip(&weight)
                 .map(|(squares, weight)| squares / (weight * weight))
                 .collect(),
@@ -232,7 +230,7 @@ impl Cells {
 
     /// The envelope of a wave: its sums under the window.
     pub(crate) fn envelope(&self, sums: &[Complex64], window: &Window) -> Vec<Complex64> {
-        let mut envelope = self.smoothed(sums, &window.taps);
+        let mut envelope = smoothed(self.size, sums, &window.taps);
         let weights = envelope.par_iter_mut().zip(&window.weight);
         weights.with_min_len(FEWEST).for_each(|(sum, weight)| {
             *sum = if *weight > 0.0 {
@@ -310,42 +308,7 @@ impl Cells {
             });
             all.collect::<Vec<f64>>()
         });
-        self.smoothed(values, &taps)
-    }
-
-    /// Convolution with the taps along columns, then along rows.
-    fn smoothed<T: Summed>(&self, values: &[T], taps: &[Vec<f64>; 2]) -> Vec<T> {
-        let [across, up] = self.size;
-        let at_once = FEWEST.div_ceil(across);
-        let mut lines = vec![T::default(); values.len()];
-        let reach = taps[0].len() / 2;
-        let all = values
-            .par_chunks_exact(across)
-            .zip(lines.par_chunks_exact_mut(across))
-            .with_min_len(at_once);
-        all.for_each(|(line, out)| {
-            for (i, tap) in taps[0].iter().enumerate() {
-                // Values at x + i − reach.
-                let (before, after) = (reach.saturating_sub(i), i.saturating_sub(reach));
-                if before.max(after) < across {
-                    add(
-                        &mut out[before..across - after],
-                        &line[after..across - before],
-                        *tap,
-                    );
-                }
-            }
-        });
-        let mut out = vec![T::default(); values.len()];
-        let reach = taps[1].len() / 2;
-        let targets = out.par_chunks_exact_mut(across).with_min_len(at_once);
-        targets.enumerate().for_each(|(y, target)| {
-            for other in y.saturating_sub(reach)..=(y + reach).min(up - 1) {
-                let line = &lines[other * across..][..across];
-                add(target, line, taps[1][other + reach - y]);
-            }
-        });
-        out
+        smoothed(self.size, values, &taps)
     }
 }
 
@@ -362,57 +325,6 @@ fn add_turned([re, im]: &mut [Vec<f64>; 2], line: &[f64], turn: Complex64) {
         },
     );
 }
-
-/// Adds values times a tap.
-fn add<T: Summed>(sums: &mut [T], values: &[T], tap: f64) {
-    widest(
-        #[inline(always)]
-        || {
-            for (sum, value) in sums.iter_mut().zip(values) {
-                *sum += *value * tap;
-            }
-        },
-    );
-}
-
-/// The sum under a window at one of `count` values in a line.
-fn under<T: Summed>(taps: &[f64], at: usize, count: usize, value: impl Fn(usize) -> T) -> T {
-    let reach = taps.len() / 2;
-    let under = at.saturating_sub(reach)..(at + reach + 1).min(count);
-    let taps = &taps[under.start + reach - at..];
-    widest(
-        #[inline(always)]
-        || {
-            let mut sum = T::default();
-            for (other, tap) in under.zip(taps) {
-                sum += value(other) * *tap;
-            }
-            sum
-        },
-    )
-}
-
-/// Nine complex numbers.
-pub(crate) type Nine = SVector<f64, 18>;
-
-/// What is in nine lists, all of one place together.
-pub(crate) fn together(lists: [&[Complex64]; 9]) -> Vec<Nine> {
-    let mut together = vec![Nine::zeros(); lists[0].len()];
-    for (n, list) in lists.into_iter().enumerate() {
-        for (all, value) in together.iter_mut().zip(list) {
-            (all[2 * n], all[2 * n + 1]) = (value.re, value.im);
-        }
-    }
-    together
-}
-
-/// What is summed under a window: numbers, or some of them together.
-pub(crate) trait Summed:
-    Copy + Default + Send + Sync + AddAssign + Mul<f64, Output = Self>
-{
-}
-
-impl<T: Copy + Default + Send + Sync + AddAssign + Mul<f64, Output = T>> Summed for T {}
 
 /// A Gaussian window at all cells.
 pub(crate) struct Window {
@@ -464,7 +376,7 @@ mod tests {
         let window = cells.window(0.8);
         let q = Vector2::new(0.3, -0.21);
         let sums = cells.mixed(&image, q);
-        let all = cells.smoothed(&sums, &window.taps);
+        let all = smoothed(cells.size, &sums, &window.taps);
         let at: Vec<usize> = (0..cells.len()).step_by(7).collect();
         let some = cells.summed_at(&sums, &window, &at);
         let whole = cells.of_whole([90, 70], q, &window, &at);

@@ -1,12 +1,26 @@
 //! What describes the phases of a lattice over its patch: a plane, where it is the same everywhere, or a change.
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
-use crate::coverage::bend::ChangeModel;
+use crate::coverage::basis::Basis;
 use crate::coverage::nodes::{Node, View};
 use crate::coverage::patch::LatticeRegion;
-use crate::coverage::phases::{Basis, Fit, fit, powers};
+use crate::coverage::phases::{Fit, fit, powers};
 use crate::numbers::splines::Splines;
+
+/// What describes the phases of a lattice that changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum ChangeModel {
+    /// The wave vectors change evenly across the patch.
+    Even,
+    /// The phases are cubic polynomials.
+    Cubic,
+    /// Any smooth variation, on a number of cells along columns and rows.
+    Smooth([usize; 2]),
+}
 
 /// Cells of splines along the longer side of the patch that are tried.
 const SPLINES: [usize; 7] = [1, 2, 3, 4, 6, 9, 13];

@@ -5,9 +5,12 @@
 
 use nalgebra::{DMatrix, DVector, Vector2};
 
-use crate::coverage::phases::{Basis, STIFFNESS};
+use crate::coverage::basis::Basis;
 use crate::numbers::normal_equations::NormalEquations;
 use crate::numbers::widest::widest;
+
+/// What holds coefficients that nothing sees, as a share of the mean of the diagonal.
+const STIFFNESS: f64 = 1e-6;
 
 /// The functions that are not zero at a place, ordered, each with its value.
 #[derive(Default)]

@@ -4,9 +4,10 @@ use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 
-use crate::coverage::cells::{Cells, Nine, Window, together};
+use crate::coverage::cells::{Cells, Window};
 use crate::coverage::hollows::hollows;
 use crate::coverage::patch::LatticeRegion;
+use crate::coverage::summed::{Nine, together};
 use crate::frame::image::Image;
 use crate::numbers::median::median;
 use crate::numbers::three::three;

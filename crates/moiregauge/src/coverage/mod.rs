@@ -5,6 +5,7 @@
 //! bubbles and holes interrupt it, another grain begins. A transform of the whole frame then shows each wave with
 //! skirts, and a pair of skirts may look like a lattice; under a window that is slid over the frame it does not.
 
+pub(crate) mod basis;
 pub(crate) mod bend;
 pub(crate) mod cells;
 pub(crate) mod choose;
@@ -20,8 +21,12 @@ pub(crate) mod patch;
 pub(crate) mod phases;
 pub(crate) mod settle;
 pub(crate) mod sides;
+pub(crate) mod slopes;
+pub(crate) mod summed;
+pub(crate) mod tidy;
 pub(crate) mod tiles;
 pub(crate) mod windows;
 
-pub use bend::{Change, ChangeModel};
+pub use bend::Change;
+pub use choose::ChangeModel;
 pub use patch::LatticeRegion;

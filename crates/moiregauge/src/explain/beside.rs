@@ -9,8 +9,7 @@ use nalgebra::{Matrix2, Vector2};
 use rustfft::num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
-use crate::explain::cells::BETTER;
-use crate::explain::evidence::Blocks;
+use crate::explain::evidence::{BETTER, Blocks};
 use crate::explain::normal::{gains, total};
 use crate::explain::phases::Phases;
 use crate::explain::scene::Scene;

@@ -11,7 +11,7 @@ use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 
 use crate::explain::beside::strongest_near;
-use crate::explain::evidence::{Blocks, gain, weakest};
+use crate::explain::evidence::{BETTER, Blocks, gain, weakest};
 use crate::explain::normal::gains;
 use crate::explain::phases::Phases;
 use crate::explain::scene::Scene;
@@ -25,10 +25,6 @@ const ORDERS: f64 = 1.1;
 const LARGEST: i32 = 5;
 /// Longest wave vector that counts, rad per bin: three bins a period.
 const LONGEST: f64 = 2.1;
-/// Standard errors by which a better description predicts more. Larger cells that were there gained 10 and more, those that were
-/// not at most 2.7 (simulated frames of two generators, lines with gains among them): chance makes so many in one of 30,000 comparisons.
-/// A faint first order gains 3 to 6 in an image, so that sets decide.
-pub(crate) const BETTER: f64 = 4.0;
 /// Standard errors that the waves in each direction of a larger cell add, at least: more than chance. Of half-order waves in one direction the others add none.
 const EACH: f64 = 1.0;
 /// The smaller cell is taken if it predicts this fraction of what the larger does: the larger one has waves that are not its own.

@@ -10,6 +10,7 @@
 pub(crate) mod beside;
 pub(crate) mod cells;
 pub(crate) mod evidence;
+pub(crate) mod lanes;
 pub(crate) mod normal;
 pub(crate) mod phases;
 pub(crate) mod scene;

@@ -6,6 +6,7 @@ use std::ops::Range;
 use nalgebra::{DVector, Matrix2, Vector2};
 use rustfft::num_complex::Complex64;
 
+use crate::explain::lanes::{Lanes, STRETCH, add, product, step, take_off};
 use crate::explain::normal::{Normal, RIDGE, Sums, amplitudes, total};
 use crate::explain::scene::Scene;
 use crate::numbers::widest::widest;
@@ -20,15 +21,10 @@ const TINY: f64 = 1e-9;
 const GROUND: usize = 6;
 /// Steps of the fit of wave vectors.
 const STEPS: usize = 5;
-/// Bins along a line over which waves are stepped: ratios of third order are off by the rounding of phases, and so is a phase by its cube.
-const STRETCH: usize = 32;
 /// Largest change of a phase at the ends of the frame in one step, rad.
 const LONGEST_STEP: f64 = 1.0;
 /// The fit stands still after a step of less than this, rad: the next one would be about its square.
 const SMALL: f64 = 0.01;
-
-/// Values at the bins of a stretch.
-type Lanes = [f64; STRETCH];
 
 /// A lattice whose two phases are a plane and polynomials of the place: `φ_j(r) = q_j·r + Σ_t c_jt P_t(u, v)` with u, v from −1 to 1.
 #[derive(Clone, Debug)]
@@ -334,25 +330,6 @@ impl Phases {
     }
 }
 
-/// Adds the products of columns with each other and with values at the bins that are there, to the sums `to(block)`.
-fn add(
-    sums: &mut Sums,
-    scene: &Scene,
-    bins: Range<usize>,
-    columns: &[Lanes],
-    values: &[f64],
-    to: impl Fn(usize) -> usize,
-) {
-    let mut row = vec![0.0; columns.len()];
-    for (lane, (block, value)) in scene.block[bins].iter().zip(values).enumerate() {
-        let Some(block) = *block else { continue };
-        for (own, column) in row.iter_mut().zip(columns) {
-            *own = column[lane];
-        }
-        sums.add(to(block), &row, *value);
-    }
-}
-
 /// Sets the first columns to the terms of a quadratic background along a line from a bin on. Returns those of phases: a plane, and [`terms`].
 fn ground(scene: &Scene, first: usize, columns: &mut [Lanes]) -> [Lanes; 2 + CUBIC] {
     let mut all = [[0.0; STRETCH]; 2 + CUBIC];
@@ -367,37 +344,6 @@ fn ground(scene: &Scene, first: usize, columns: &mut [Lanes]) -> [Lanes; 2 + CUB
     columns[0] = [1.0; STRETCH];
     columns[1..GROUND].copy_from_slice(&all[..GROUND - 1]);
     all
-}
-
-/// Takes the sum of columns, each times its weight, off the values.
-#[inline]
-fn take_off(columns: &[Lanes], weights: &[f64], values: &mut Lanes) {
-    for (column, weight) in columns.iter().zip(weights) {
-        let each = values.iter_mut().zip(column);
-        each.for_each(|(value, column)| *value -= weight * column);
-    }
-}
-
-/// Products of two waves, or of their conjugates where the sign is negative; of a sign of 0 the imaginary part counts as 0.
-#[inline]
-fn product(a: &[Lanes; 2], b: &[Lanes; 2], signs: [f64; 2]) -> [Lanes; 2] {
-    let [s, t] = signs;
-    [
-        from_fn(|i| a[0][i] * b[0][i] - s * t * (a[1][i] * b[1][i])),
-        from_fn(|i| t * (a[0][i] * b[1][i]) + s * (a[1][i] * b[0][i])),
-    ]
-}
-
-/// A wave along a line whose phase is a cubic polynomial, from the phases of the first four bins: the value is stepped by its ratios of first, second
-/// and third order from bin to bin.
-fn step([a, b, c, d]: [f64; 4], lanes: &mut [Lanes; 2]) {
-    let ratios = [a, b - a, c - 2.0 * b + a, d - 3.0 * c + 3.0 * b - a];
-    let [mut value, mut first, mut second, third] = ratios.map(Complex64::cis);
-    let [re, im] = lanes;
-    for (re, im) in re.iter_mut().zip(im) {
-        (*re, *im) = (value.re, value.im);
-        (value, first, second) = (value * first, first * second, second * third);
-    }
 }
 
 #[cfg(test)]

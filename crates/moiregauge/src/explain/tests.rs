@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use nalgebra::{Matrix2, Vector2};
 
 use crate::explain::beside::wave_beside;
-use crate::explain::cells::{BETTER, Supercell, Superlattice, better_cell, superlattice};
-use crate::explain::evidence::{Blocks, gain, weakest};
+use crate::explain::cells::{Supercell, Superlattice, better_cell, superlattice};
+use crate::explain::evidence::{BETTER, Blocks, gain, weakest};
 use crate::explain::scene::{Scene, gaussian_mean};
 use crate::explain::table::table;
 use crate::frame::image::Image;

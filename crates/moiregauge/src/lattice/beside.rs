@@ -9,7 +9,7 @@ use nalgebra::Matrix2;
 
 use crate::coverage::find::cells;
 use crate::explain::beside::wave_beside;
-use crate::explain::cells::BETTER;
+use crate::explain::evidence::BETTER;
 use crate::explain::waves::{Part, WithWaves, better_with_waves};
 use crate::frame::background::Background;
 use crate::frame::geometry::Geometry;

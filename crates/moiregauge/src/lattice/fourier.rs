@@ -8,8 +8,8 @@
 use heterostrain::lattice::{Lattice, Px, Waves};
 use nalgebra::{Matrix2, Vector2};
 
+use crate::spectrum::hann::hann;
 use crate::spectrum::harmonics::{Harmonic, Harmonics};
-use crate::spectrum::transform::hann;
 
 /// Fits the lattice to the first three wave vectors. `size` is (columns, rows).
 pub(crate) fn measure(

@@ -3,10 +3,8 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use heterostrain::lattice::shortest_pair;
 use nalgebra::Matrix2;
 
-use crate::coverage::patch::LatticeRegion;
 use crate::frame::background::Background;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
@@ -74,22 +72,7 @@ pub(crate) fn measure_clipped(
     Ok(of_better_cell(found, image, geometry, background, method))
 }
 
-/// The lattice of some pair of waves (rad per pixel) in a part of an image, or in all of it; `None` where it cannot be measured.
-pub(crate) fn measure_pair(
-    pair: &Matrix2<f64>,
-    part: Option<&LatticeRegion>,
-    image: &Image,
-    geometry: &Geometry,
-    background: Background,
-    method: Method,
-) -> Option<MeasuredLattice> {
-    let to_physical = geometry.pixel_to_nm.try_inverse()?.transpose();
-    let pair = pair * shortest_pair(&(to_physical * pair))?;
-    let start = Start::at_on(part, image, geometry, background, &pair)?;
-    start.measure(method).ok()
-}
-
-/// The same for a lattice that is one of several and everywhere: nothing is asked of what lies beside it.
+/// The lattice that is one of several and everywhere: nothing is asked of what lies beside it.
 ///
 /// # Errors
 /// As [`measure`](crate::lattice::find::measure).

@@ -12,6 +12,7 @@ pub(crate) mod find;
 pub(crate) mod fit;
 pub(crate) mod fourier;
 pub(crate) mod ground;
+pub(crate) mod lag_noise;
 pub(crate) mod measure;
 pub(crate) mod measured;
 pub(crate) mod paper;

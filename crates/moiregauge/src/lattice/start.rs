@@ -5,7 +5,7 @@ mod parts;
 
 use std::sync::Arc;
 
-use heterostrain::lattice::reciprocal;
+use heterostrain::lattice::{reciprocal, shortest_pair};
 use nalgebra::{Matrix2, Vector2};
 
 use crate::coverage::bend::Mean;
@@ -18,11 +18,12 @@ use crate::frame::clip::cut_off;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::lattice::fit::measure as fit;
-use crate::lattice::measured::Grain;
+use crate::lattice::measured::{Grain, MeasuredLattice};
 use crate::numbers::three::three;
 use crate::spectrum::error::{LatticeError, THIRD};
 use crate::spectrum::harmonics::{Harmonics, Windowed};
 use crate::spectrum::look::bins_for;
+use crate::spectrum::method::Method;
 use crate::spectrum::prepare::{Prepared, binned, levelled, prepare, prepare_levelled};
 use crate::spectrum::shells::shells;
 use crate::spectrum::transform::Spectrum;
@@ -344,4 +345,19 @@ pub(crate) fn fitted(
         lattice: found.lattice.mapped(&to_pixels),
         fit: found.fit.in_pixels(binning),
     })
+}
+
+/// The lattice of some pair of waves (rad per pixel) in a part of an image, or in all of it; `None` where it cannot be measured.
+pub(crate) fn measure_pair(
+    pair: &Matrix2<f64>,
+    part: Option<&LatticeRegion>,
+    image: &Image,
+    geometry: &Geometry,
+    background: Background,
+    method: Method,
+) -> Option<MeasuredLattice> {
+    let to_physical = geometry.pixel_to_nm.try_inverse()?.transpose();
+    let pair = pair * shortest_pair(&(to_physical * pair))?;
+    let start = Start::at_on(part, image, geometry, background, &pair)?;
+    start.measure(method).ok()
 }

@@ -1,9 +1,12 @@
 //! One scan once it is measured: a few numbers, and no pixels.
 
+use std::ops::Deref;
+use std::sync::Arc;
+
 use heterostrain::Estimate;
 use heterostrain::lattice::{Lattice, Px, block, labelled_like};
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use spmfile::{DateTime, FrameDirection, LineDirection};
 
 use crate::caveat::Caveat;
@@ -13,7 +16,6 @@ use crate::frame::grid_errors::GridErrors;
 use crate::lattice::measured::MeasuredLattice;
 use crate::numbers::exact;
 use crate::scan::fingerprint::Fingerprint;
-use crate::scan::lines::MeasuredLines;
 use crate::scan::written;
 use crate::settings::knobs::Settings;
 use crate::settings::ranges::OutOfRange;
@@ -89,6 +91,46 @@ pub struct MeasuredLine {
     pub(crate) displacement: Vec<[f64; 2]>,
     /// To know the whole image again.
     pub(crate) pixels: Fingerprint,
+}
+
+/// What the lines of one scan gave, one entry for each line direction. They are nearly all that a measured scan is, and nothing
+/// changes them once the scan is put together: copies share them.
+#[derive(Clone, Debug)]
+pub struct MeasuredLines(Arc<[MeasuredLine]>);
+
+impl From<Vec<MeasuredLine>> for MeasuredLines {
+    fn from(lines: Vec<MeasuredLine>) -> Self {
+        Self(lines.into())
+    }
+}
+
+impl Deref for MeasuredLines {
+    type Target = [MeasuredLine];
+
+    fn deref(&self) -> &Self::Target {
+        &self.0
+    }
+}
+
+impl<'a> IntoIterator for &'a MeasuredLines {
+    type Item = &'a MeasuredLine;
+    type IntoIter = std::slice::Iter<'a, MeasuredLine>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.0.iter()
+    }
+}
+
+impl Serialize for MeasuredLines {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        self.0.serialize(to)
+    }
+}
+
+impl<'de> Deserialize<'de> for MeasuredLines {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        Vec::deserialize(from).map(Self::from)
+    }
 }
 
 impl MeasuredLine {

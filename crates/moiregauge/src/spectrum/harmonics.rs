@@ -11,8 +11,8 @@ use crate::frame::background::{Background, take_background_off};
 use crate::frame::image::Image;
 use crate::numbers::dot::dot;
 use crate::numbers::interrupt;
-use crate::numbers::widest::widest;
-use crate::spectrum::transform::hann;
+use crate::spectrum::hann::{hann, hann_transform};
+use crate::spectrum::model::{Sum, centre, summed};
 
 /// One harmonic of the lattice.
 #[derive(Clone, Copy, Debug)]
@@ -52,11 +52,6 @@ impl Harmonics {
         take_background_off(&mut model, background);
         model
     }
-}
-
-/// The middle of the pixels of a frame.
-fn centre(columns: usize, rows: usize) -> Vector2<f64> {
-    Vector2::new((columns as f64 - 1.0) / 2.0, (rows as f64 - 1.0) / 2.0)
 }
 
 impl Harmonic {
@@ -309,60 +304,6 @@ impl Windowed {
     }
 }
 
-/// Waves in sum.
-pub(crate) struct Sum {
-    constant: f64,
-    /// Wave vectors (rad per pixel) and amplitudes, phases at the centre.
-    pub(crate) waves: Vec<(Vector2<f64>, Complex64)>,
-}
-
-impl Sum {
-    /// As [`Harmonics::model`].
-    pub(crate) fn model(&self, image: &Image, background: Background) -> Image {
-        let mut model = summed(image, self.constant, self.waves.iter().copied());
-        take_background_off(&mut model, background);
-        model
-    }
-}
-
-/// The sum of waves, phases at the centre, with the shape and the missing pixels of `image`.
-fn summed(
-    image: &Image,
-    constant: f64,
-    waves: impl Iterator<Item = (Vector2<f64>, Complex64)>,
-) -> Image {
-    let centre = centre(image.columns, image.rows);
-    let mut values = vec![constant; image.values.len()];
-    for (q, amplitude) in waves {
-        let (im, re): (Vec<f64>, Vec<f64>) = (0..image.columns)
-            .map(|c| (q.x * (c as f64 - centre.x)).sin_cos())
-            .unzip();
-        for (row, line) in values.chunks_exact_mut(image.columns).enumerate() {
-            interrupt::check();
-            let c = 2.0 * amplitude * Complex64::from_polar(1.0, q.y * (row as f64 - centre.y));
-            add_wave(line, c, [&re, &im]);
-        }
-    }
-    for (v, measured) in values.iter_mut().zip(&image.values) {
-        if !measured.is_finite() {
-            *v = f64::NAN;
-        }
-    }
-    Image::new(image.rows, image.columns, values)
-}
-
-/// Adds a wave to a line: `Re(c (re + i im))`.
-fn add_wave(line: &mut [f64], c: Complex64, [re, im]: [&[f64]; 2]) {
-    widest(
-        #[inline(always)]
-        || {
-            for ((v, re), im) in line.iter_mut().zip(re).zip(im) {
-                *v += c.re * re - c.im * im;
-            }
-        },
-    );
-}
-
 /// Image minus model; missing pixels become 0.
 fn residual(image: &Image, model: &Image) -> Image {
     let values = image
@@ -372,28 +313,6 @@ fn residual(image: &Image, model: &Image) -> Image {
         .map(|(v, m)| if v.is_finite() { v - m } else { 0.0 })
         .collect();
     Image::new(image.rows, image.columns, values)
-}
-
-/// `Σ w(n) cos(q (n − centre))` of the Hann window of `n` pixels: three Dirichlet kernels.
-pub(crate) fn hann_transform(q: f64, n: usize) -> f64 {
-    /// Nearer to a peak of a kernel both of its sines are calculated there: their ratio is exact then.
-    const NEAR: f64 = 1e-3;
-    let n = n as f64;
-    let step = std::f64::consts::TAU / n;
-    // Half a turn from kernel to kernel.
-    let sin = (n * q / 2.0).sin();
-    let dirichlet = |q: f64, sin: f64| {
-        let half = (q / 2.0).sin();
-        if half.abs() < 1e-9 {
-            // At multiples of 2π every cosine is ±1; the sign of an even n alternates with them.
-            n * (n * q / 2.0).cos() / (q / 2.0).cos()
-        } else if half.abs() < NEAR {
-            (n * q / 2.0).sin() / half
-        } else {
-            sin / half
-        }
-    };
-    0.5 * dirichlet(q, sin) + 0.25 * (dirichlet(q + step, -sin) + dirichlet(q - step, -sin))
 }
 
 #[cfg(test)]

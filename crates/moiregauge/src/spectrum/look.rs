@@ -16,8 +16,9 @@ use crate::frame::image::Image;
 use crate::frame::smaller::{mean_over, response, smaller};
 use crate::numbers::dot::dot;
 use crate::numbers::interrupt;
+use crate::spectrum::hann::hann;
 use crate::spectrum::harmonics::Harmonics;
-use crate::spectrum::transform::{Spectrum, hann};
+use crate::spectrum::transform::Spectrum;
 use crate::spectrum::verdict::{is_lattice, refine, signal_to_noise};
 use crate::spectrum::{high_orders, select};
 

@@ -2,12 +2,16 @@
 
 pub(crate) mod error;
 pub(crate) mod fourier;
+pub(crate) mod hann;
 pub(crate) mod harmonics;
 pub(crate) mod high_orders;
 pub(crate) mod known;
+pub(crate) mod lags;
 pub(crate) mod look;
 pub(crate) mod method;
+pub(crate) mod model;
 pub(crate) mod noise;
+pub(crate) mod noise_map;
 pub(crate) mod phases;
 pub(crate) mod pictures;
 pub(crate) mod prepare;

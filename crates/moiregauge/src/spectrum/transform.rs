@@ -10,6 +10,8 @@ use rustfft::num_complex::{Complex, Complex64};
 
 use crate::frame::image::Image;
 use crate::spectrum::fourier::{Grid, Kept, columns_in_place, forward, inverses, wide};
+use crate::spectrum::hann::hann;
+use crate::spectrum::lags::{Autocorrelation, Overlap, lag_sums};
 
 /// Spectrum `F(k) = Σ w(n) I(n) e^{−ik·n}` on the padded grid, for non-negative column frequencies.
 pub(crate) struct Spectrum<T = f64> {
@@ -255,62 +257,6 @@ impl<T: Kept> Spectrum<T> {
     /// Value at the grid point (column frequency `kx ≥ 0`, row frequency `ky` mod rows).
     pub(crate) fn value(&self, kx: usize, ky: usize) -> Complex64 {
         wide(self.values[ky * self.half() + kx])
-    }
-}
-
-/// Autocorrelation: rows of lags 0 … `max_lag[1]`, columns −`max_lag[0]` … `max_lag[0]`.
-pub(crate) struct Autocorrelation {
-    /// Largest lag along columns and rows.
-    pub(crate) max_lag: [usize; 2],
-    values: Vec<f64>,
-}
-
-impl Autocorrelation {
-    /// Value at the lag (dx, dy); the function is even. `None` outside or where nothing overlaps.
-    pub(crate) fn at(&self, dx: i64, dy: i64) -> Option<f64> {
-        let (dx, dy) = if dy < 0 { (-dx, -dy) } else { (dx, dy) };
-        let mx = self.max_lag[0] as i64;
-        if dx.abs() > mx || dy > self.max_lag[1] as i64 {
-            return None;
-        }
-        let v = self.values[dy as usize * (2 * self.max_lag[0] + 1) + (dx + mx) as usize];
-        v.is_finite().then_some(v)
-    }
-}
-
-enum Overlap {
-    Separable(Vec<f64>, Vec<f64>),
-    Full(Vec<f64>),
-}
-
-impl Overlap {
-    fn at(&self, ix: usize, iy: usize, width: usize, centre: usize) -> f64 {
-        match self {
-            Self::Separable(x, y) => x[ix.abs_diff(centre)] * y[iy],
-            Self::Full(values) => values[iy * width + ix],
-        }
-    }
-}
-
-/// `Σ_x w(x) w(x + lag)` for lags 0 … `max_lag`.
-fn lag_sums(w: &[f64], max_lag: usize) -> Vec<f64> {
-    (0..=max_lag)
-        .map(|lag| w.iter().zip(&w[lag..]).map(|(a, b)| a * b).sum())
-        .collect()
-}
-
-/// Hann window sampled at pixel centres.
-pub(crate) fn hann(n: usize) -> Vec<f64> {
-    (0..n).map(|i| hann_at(i as f64, n)).collect()
-}
-
-/// The Hann window of `n` pixels at the position `x` (pixels; zero outside).
-pub(crate) fn hann_at(x: f64, n: usize) -> f64 {
-    let t = (x + 0.5) / n as f64;
-    if (0.0..=1.0).contains(&t) {
-        (std::f64::consts::PI * t).sin().powi(2)
-    } else {
-        0.0
     }
 }
 

@@ -10,8 +10,8 @@ use rustfft::num_complex::Complex64;
 
 use crate::frame::image::Image;
 use crate::numbers::{MOST_ROUNDS, interrupt};
+use crate::spectrum::hann::hann;
 use crate::spectrum::noise::LocalNoise;
-use crate::spectrum::transform::hann;
 use crate::stripes::find::SAME;
 
 /// The wave vector stands when it moves by less than this, in cycles over the frame: far below any error.

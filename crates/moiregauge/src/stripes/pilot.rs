@@ -7,8 +7,9 @@ use crate::stripes::wave::{Local, Wave};
 use crate::window::blocks::mix;
 use crate::window::carrier::{Carrier, MOST_CELLS, Slope};
 use crate::window::lines::Levelled;
+use crate::window::lines::TELLING;
 use crate::window::mixed::{FOLLOWED, LOOKED_AT, Mixed, ROUNDS, WORTH};
-use crate::window::noise::{TELLING, power, whole};
+use crate::window::noise::{power, whole};
 use crate::window::smooth::{Nodes, Smoothed, smooth};
 use crate::window::widths::OF_DIFFERENCE;
 

@@ -13,11 +13,12 @@ use rustfft::num_complex::Complex64;
 use crate::frame::image::Image;
 use crate::numbers::interrupt;
 use crate::numbers::median::median;
+use crate::spectrum::hann::hann;
 use crate::spectrum::shells::SHELLS;
-use crate::spectrum::transform::hann;
-use crate::window::noise::TELLING;
 use crate::window::types::Reference;
 
+/// Powers of noise, or nodes with powers, that a level needs at least: it is good to a third then.
+pub(crate) const TELLING: usize = 8;
 /// Offsets matter beyond this over the root of the number of lines: as in the fit of a whole image.
 const OFFSETS: f64 = 8.0;
 

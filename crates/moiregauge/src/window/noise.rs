@@ -15,7 +15,7 @@ use nalgebra::{Matrix2, Vector2};
 
 use crate::numbers::median::median;
 use crate::window::blocks::{Blocks, Place, block_of, mix, stride_of};
-use crate::window::lines::Levelled;
+use crate::window::lines::{Levelled, TELLING};
 use crate::window::smooth::{Envelope, Nodes, Smoothed, Support, smooth};
 use crate::window::types::Reference;
 
@@ -29,8 +29,6 @@ const AVERAGED: f64 = 3.0;
 const WHOLE: f64 = 0.85;
 /// ... nor those nearer to the edges than this, widths, for the same reason.
 const AWAY: f64 = 2.5;
-/// Powers of noise, or nodes with powers, that a level needs at least: it is good to a third then.
-pub(crate) const TELLING: usize = 8;
 /// Multiple of the level at which powers are clipped: e⁻⁴ of chance is cut, and allowed for; defects are cut, too.
 const CUT: f64 = 4.0;
 /// Harmonics looked beside at a time, for the memory's sake.

@@ -1,6 +1,7 @@
 //! Caveats of a set: scatter, significance, scans that do not fit, readings.
 
-use crate::campaign::analysis::{ScanAnalysis, SetAnalysis, SetMean};
+use crate::campaign::analysis::{ScanAnalysis, SetAnalysis};
+use crate::campaign::means::SetMean;
 use crate::campaign::set::mean::counted;
 use crate::campaign::set::moire;
 use crate::campaign::set::ruler::is_contradicted;

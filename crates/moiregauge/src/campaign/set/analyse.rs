@@ -2,8 +2,9 @@
 
 use nalgebra::Matrix2;
 
-use crate::campaign::analysis::{Ruled, SetAnalysis, SetMean};
+use crate::campaign::analysis::{Ruled, SetAnalysis};
 use crate::campaign::group::Group;
+use crate::campaign::means::SetMean;
 use crate::campaign::set::about::about_set;
 use crate::campaign::set::assumed::assumed;
 use crate::campaign::set::bare::bare;

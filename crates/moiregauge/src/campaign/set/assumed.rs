@@ -11,12 +11,10 @@
 
 use nalgebra::{Matrix2, Vector2};
 
-use crate::campaign::analysis::SetMean;
-use crate::campaign::set::bare::SetLattice;
+use crate::campaign::means::{SetLattice, SetMean};
 use crate::campaign::set::drift::at_velocity;
 use crate::campaign::set::solved::Solved;
-pub use crate::caveat::drifting::AssumedDrift;
-use crate::caveat::drifting::DriftShare;
+use crate::caveat::drifting::{AssumedDrift, DriftShare};
 use crate::drift::linear::Observation;
 use crate::meaning::budget::Source;
 use crate::scan::measured::{MeasuredLine, MeasuredScan};

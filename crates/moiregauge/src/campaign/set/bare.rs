@@ -5,7 +5,7 @@ use heterostrain::lattice::Lattice;
 use nalgebra::Matrix4;
 
 use crate::campaign::analysis::ScanAnalysis;
-use crate::campaign::set::assumed::AssumedDrift;
+use crate::campaign::means::SetLattice;
 use crate::campaign::set::mean::counted;
 use crate::campaign::set::solved::Solved;
 use crate::drift::shares::Statistical;
@@ -13,24 +13,6 @@ use crate::frame::grid_errors::GridErrors;
 use crate::meaning::budget::wavelength_variances;
 use crate::numbers::spread::mean_and_spread;
 use crate::settings::knobs::Settings;
-
-/// The lattice of all scans of a set that no twist and strain explain: of atoms, of a surface, of other layers.
-#[derive(Clone, Debug)]
-#[non_exhaustive]
-pub struct SetLattice {
-    /// Lattice vectors, nm, corrected for drift where the set has one.
-    pub lattice: Lattice,
-    /// The drift that was assumed where the scans do not tell it; `None` where it was measured or given.
-    pub assumed: Option<AssumedDrift>,
-    /// Lengths of L₁, L₂ and L₃ with their statistical and total uncertainties, nm.
-    pub wavelengths: [TotalEstimate; 3],
-    /// The total of the first length without the drift, nm.
-    pub without_drift: f64,
-    /// Standard deviations of the three lengths over the scans, nm; NaN for one scan.
-    pub scatter: [f64; 3],
-    /// χ² per degree of freedom of the scans against this lattice; `None` for one image.
-    pub chi2_per_dof: Option<f64>,
-}
 
 /// All scans together, their drift taken off where it is known, or with that of an assumed one in the errors; `shared` is the covariance that they have in common.
 pub(crate) fn bare(

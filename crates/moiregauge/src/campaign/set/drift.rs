@@ -3,7 +3,7 @@
 use heterostrain::lattice::Lattice;
 use nalgebra::{Matrix2, Vector2};
 
-use crate::campaign::analysis::{Drift, DriftFit};
+use crate::campaign::motion::{Drift, DriftFit};
 use crate::campaign::set::headers::about_dates;
 use crate::campaign::set::published;
 use crate::campaign::set::solved::Solved;

@@ -5,7 +5,9 @@ use heterostrain::strain::twist_strain;
 use nalgebra::{Matrix2, Vector2};
 use spmfile::FrameDirection;
 
-use crate::campaign::analysis::{Checks, Drift, JointTerms, Residual, ScanAnalysis, Scatter};
+use crate::campaign::analysis::ScanAnalysis;
+use crate::campaign::means::{Checks, Residual, Scatter};
+use crate::campaign::motion::{Drift, JointTerms};
 use crate::campaign::set::headers::about_headers;
 use crate::campaign::set::solved::Solved;
 use crate::campaign::sightings::sightings;

@@ -5,7 +5,8 @@ use heterostrain::strain::TwistStrain;
 use nalgebra::{Matrix2, Matrix4, Vector2};
 use spmfile::FrameDirection;
 
-use crate::campaign::analysis::{ScanAnalysis, SetMean};
+use crate::campaign::analysis::ScanAnalysis;
+use crate::campaign::means::SetMean;
 use crate::campaign::set::moire::moire;
 use crate::campaign::set::scan::plain_mean;
 use crate::campaign::set::solved::Solved;

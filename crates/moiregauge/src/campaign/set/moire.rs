@@ -13,8 +13,8 @@ use heterostrain::strain::{TwistStrain, draws, twist_strain};
 use rayon::prelude::*;
 
 use crate::calibration::KnownLattice;
-use crate::campaign::analysis::{ScanAnalysis, SetMean};
-use crate::campaign::set::bare::SetLattice;
+use crate::campaign::analysis::ScanAnalysis;
+use crate::campaign::means::{SetLattice, SetMean};
 use crate::caveat::Caveat;
 use crate::caveat::moires::{Impossible, MoireDoubt, PeriodDoubt};
 use crate::numbers::interrupt;

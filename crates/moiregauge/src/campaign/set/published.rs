@@ -5,14 +5,14 @@ use nalgebra::{Matrix2, Vector2};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-use crate::campaign::analysis::{Drift, DriftFit, ScanAnalysis};
+use crate::campaign::analysis::ScanAnalysis;
+use crate::campaign::motion::{Drift, DriftFit};
 use crate::campaign::set::solved::Solved;
 use crate::drift::linear::{DriftSolution, Observation, at_known_drift, common_lattice};
 use crate::drift::paper::{PaperScan, normal_vector, successive_draws, successive_drift};
 use crate::drift::shares::Statistical;
 use crate::frame::axis::Axis;
-use crate::numbers::interrupt;
-use crate::numbers::rng;
+use crate::numbers::{interrupt, rng};
 use crate::scan::measured::{MeasuredLine, MeasuredScan};
 use crate::settings::knobs::Settings;
 

@@ -11,7 +11,9 @@ use nalgebra::{Matrix2, Matrix3, Matrix4, Vector2, Vector3};
 use spmfile::LineDirection;
 
 use crate::calibration::{Calibration, Coordinates, KnownLattice, shown};
-use crate::campaign::analysis::{Drift, LineRuler, Ruled, ScanAnalysis, SetMean};
+use crate::campaign::analysis::{LineRuler, Ruled, ScanAnalysis};
+use crate::campaign::means::SetMean;
+use crate::campaign::motion::Drift;
 use crate::drift::linear::{Observation, common_lattice};
 use crate::lattice::several::atoms::is_of;
 use crate::meaning::ruler::ByRuler;

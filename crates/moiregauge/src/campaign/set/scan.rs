@@ -4,7 +4,8 @@ use heterostrain::Estimate;
 use heterostrain::lattice::{Lattice, Nm, Pair, Px, labelled_like};
 use nalgebra::{Matrix2, Matrix4, Vector2};
 
-use crate::campaign::analysis::{Drift, LineAnalysis, Motion, ScanAnalysis};
+use crate::campaign::analysis::{LineAnalysis, ScanAnalysis};
+use crate::campaign::motion::{Drift, Motion};
 use crate::campaign::set::moire::moire;
 use crate::campaign::sightings::middle_of_frame;
 use crate::drift::joint::found::JointFit;

@@ -2,8 +2,8 @@
 
 use heterostrain::lattice::Lattice;
 
-use crate::campaign::analysis::Drift;
-use crate::campaign::set::assumed::AssumedDrift;
+use crate::campaign::motion::Drift;
+use crate::caveat::drifting::AssumedDrift;
 use crate::drift::shares::Statistical;
 
 /// The drift of a set and the lattice that goes with it.

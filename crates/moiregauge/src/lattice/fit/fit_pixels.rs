@@ -2,16 +2,13 @@
 
 use std::sync::OnceLock;
 
-use heterostrain::lattice::{Lattice, Px, Waves};
 use nalgebra::{DMatrix, DVector, Matrix2, SMatrix, Vector2};
 use rustfft::num_complex::Complex64;
 
 use crate::frame::background::Background;
 use crate::frame::image::Image;
 use crate::lattice::fit::bend::Inhomogeneity;
-use crate::lattice::fit::cells::larger_of;
 use crate::lattice::fit::first::at_first;
-use crate::lattice::fit::fitted::{FittedHarmonic, LatticeFit};
 use crate::lattice::fit::folded::{Bends, Folded};
 use crate::lattice::fit::frame::{BENT, Basis, Frame};
 use crate::lattice::fit::gram::gram;
@@ -20,9 +17,8 @@ use crate::lattice::fit::lines::LineStatistics;
 use crate::lattice::fit::model::{Clip, LineOffsets, Model, look, settled};
 use crate::lattice::fit::noise::ResidualNoise;
 use crate::lattice::fit::places::{InPlaces, Places};
-use crate::lattice::fit::straight::Followed;
 use crate::lattice::fit::tables::Tables;
-use crate::lattice::fit::{bend, closure, frame, solve};
+use crate::lattice::fit::{bend, frame, solve};
 use crate::numbers::MOST_ROUNDS;
 use crate::numbers::dot::dot;
 use crate::spectrum::harmonics::Harmonics;
@@ -44,7 +40,7 @@ pub(crate) struct Fit<'a> {
     pub(crate) lines: LineOffsets,
     /// Each line's mean is gone already.
     free_lines: bool,
-    line_sigma: Option<f64>,
+    pub(super) line_sigma: Option<f64>,
     /// Standard deviation of the residuals.
     pub(crate) sigma: f64,
     /// Residuals cut off.
@@ -52,9 +48,9 @@ pub(crate) struct Fit<'a> {
     /// The pair at the start, phase at the edges.
     origin: Matrix2<f64>,
     /// `Φᵀ W Φ` of the last step.
-    gram: DMatrix<f64>,
+    pub(super) gram: DMatrix<f64>,
     /// `Φᵀ W` times the residual of the last step.
-    gradient: DVector<f64>,
+    pub(super) gradient: DVector<f64>,
     /// Nothing has changed since the last step.
     pub(crate) settled: bool,
 }
@@ -357,90 +353,4 @@ impl<'a> Fit<'a> {
         let found = bend::inhomogeneity(&self.frame, &self.model, gram, bends, &acting);
         found.map(|(inhomogeneity, _)| inhomogeneity)
     }
-
-    fn harmonics(&self, noise: &FinalNoise) -> Vec<FittedHarmonic> {
-        let pixels = self.frame.pixels() as f64;
-        let waves = self.model.waves.iter().zip(&self.model.basis.indices);
-        waves
-            .zip(&noise.local)
-            .map(|((&[alpha, beta], &index), local)| {
-                let amplitude = alpha.hypot(beta);
-                FittedHarmonic {
-                    index,
-                    amplitude,
-                    phase: (-beta).atan2(alpha),
-                    signal_to_noise: 0.5 * amplitude * (pixels / local[2]).sqrt(),
-                }
-            })
-            .collect()
-    }
-
-    pub(crate) fn result(&self, followed: &Followed) -> Option<(Lattice<Px>, LatticeFit)> {
-        let noise = &followed.noise;
-        let scale = self.frame.edge().map(|e| 1.0 / e);
-        let harmonics = self.harmonics(noise);
-        let strengths: Vec<f64> = harmonics.iter().map(|h| h.signal_to_noise).collect();
-        let closure = closure::closure(
-            &self.model,
-            &self.gram,
-            &self.gradient,
-            &noise.acting(),
-            &strengths,
-        );
-        let covariance = self.covariance(noise)?;
-        let enlargement = closure.map_or(1.0, |closure| closure.enlargement());
-        let inhomogeneity = followed.change;
-        let mut wave_vectors = Waves::new(
-            self.model.pair,
-            covariance.fixed_view::<4, 4>(3, 3) * enlargement,
-        )
-        .mapped(&Matrix2::from_diagonal(&scale));
-        let clipped = self.clipped();
-        if let Some(change) = inhomogeneity.filter(Inhomogeneity::is_significant) {
-            let (mean, covariance) = change.of_the_mean(clipped, followed.mean);
-            wave_vectors.basis += mean;
-            wave_vectors.covariance += covariance;
-        }
-        let bends = inhomogeneity.is_some_and(|change| change.is_significant());
-        let of_noise = covariance.fixed_view::<4, 4>(3, 3).trace();
-        if let Some(cells) = self.of_cells(bends).filter(|cells| cells.exceed(of_noise)) {
-            let cells = Waves::<Px>::new(self.model.pair, cells.covariance)
-                .mapped(&Matrix2::from_diagonal(&scale));
-            wave_vectors.covariance = larger_of(&wave_vectors.covariance, &cells.covariance)?;
-        }
-        let [columns, rows] = [
-            self.frame.image.columns as f64,
-            self.frame.image.rows as f64,
-        ];
-        let off = self.frame.middle();
-        let carry = carry(off);
-        let fit = LatticeFit {
-            wave_vectors,
-            centre: Vector2::new(columns - 1.0, rows - 1.0) / 2.0,
-            off_centre: off.component_mul(&self.frame.edge()),
-            harmonics,
-            phase_covariance: carry * covariance * carry.transpose(),
-            goodness: noise.rms / noise.residual.level().sqrt(),
-            line_offsets: self.line_sigma,
-            lines_left_out: self.frame.image.rows - self.frame.lines(),
-            clipped,
-            residual: noise.places.left.clone(),
-            inhomogeneity,
-            closure,
-        };
-        Some((wave_vectors.lattice()?, fit))
-    }
-}
-
-/// What carries the phases of the first shell, with the pair, from the centre of the frame to (X, Y): 3 × 7.
-fn carry(to: Vector2<f64>) -> SMatrix<f64, 3, 7> {
-    let mut carry = SMatrix::<f64, 3, 7>::zeros();
-    for (i, [h, k]) in FIRST_SHELL.into_iter().enumerate() {
-        carry[(i, i)] = 1.0;
-        for axis in 0..2 {
-            carry[(i, 3 + axis)] = f64::from(h) * to[axis];
-            carry[(i, 5 + axis)] = f64::from(k) * to[axis];
-        }
-    }
-    carry
 }

@@ -190,7 +190,7 @@ fn dirichlet(u: f64, [sin, cos]: [f64; 2], n: f64) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spectrum::harmonics::hann_transform;
+    use crate::spectrum::hann::hann_transform;
 
     /// The transforms of a run of bins are those by themselves, also at the bins, and slopes are their differences.
     #[test]

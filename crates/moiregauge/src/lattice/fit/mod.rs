@@ -39,6 +39,7 @@ pub(crate) mod local;
 pub(crate) mod measure;
 pub(crate) mod model;
 pub(crate) mod noise;
+pub(crate) mod outcome;
 pub(crate) mod places;
 pub(crate) mod solve;
 pub(crate) mod straight;

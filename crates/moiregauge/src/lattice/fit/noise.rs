@@ -14,7 +14,8 @@ use crate::lattice::fit::leverage::{ALONG, Leverage};
 use crate::lattice::fit::local::{Bin, acting_on};
 use crate::numbers::median::median;
 use crate::spectrum::fourier::wide;
-use crate::spectrum::transform::{Spectrum, hann};
+use crate::spectrum::hann::hann;
+use crate::spectrum::transform::Spectrum;
 
 /// Bins nearer to zero frequency than this belong to the background: a plane fills the first.
 const BACKGROUND: i64 = 2;

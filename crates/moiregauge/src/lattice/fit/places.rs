@@ -22,8 +22,8 @@ use crate::lattice::fit::left::LeftOver;
 use crate::lattice::fit::model::Model;
 use crate::lattice::fit::noise::BESIDE;
 use crate::numbers::dot::dot;
+use crate::spectrum::hann::hann;
 use crate::spectrum::shells::FIRST_SHELL;
-use crate::spectrum::transform::hann;
 
 /// Bins on either side of a harmonic across the lines; along them, one.
 const ACROSS: i64 = 16;

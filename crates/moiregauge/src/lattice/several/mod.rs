@@ -16,6 +16,7 @@
 //! Buja, Hastie and Tibshirani, Ann. Statist. 17, 453 (1989), backfitting.
 
 pub(crate) mod atoms;
+pub(crate) mod entangled;
 pub(crate) mod split;
 pub(crate) mod together;
 

@@ -385,7 +385,7 @@ fn totals_hold_what_the_scanner_adds() {
     assert_eq!(twist.value, found.twist);
     assert!(twist.statistical == 0.0 && twist.total > 0.00999 * twist.value);
 
-    let drift = |given: bool| crate::campaign::analysis::Drift {
+    let drift = |given: bool| crate::campaign::motion::Drift {
         velocity: Vector2::new(0.5, -0.15),
         covariance: Matrix2::new(9e-6, 0.0, 0.0, 1e-6),
         given,
