@@ -79,7 +79,7 @@ pub enum MapError {
 /// Maps the images behind `analysed`, drift and sensors taken into account as there.
 ///
 /// `origin` is the time at which places on the sample are meant, that of the middle of the first frame
-/// ([`crate::campaign::analysis::Motion`]). By tiles, the window of `resolution` is the side of a tile.
+/// ([`crate::campaign::motion::Motion`]). By tiles, the window of `resolution` is the side of a tile.
 ///
 /// # Errors
 /// [`MapError`], where none of its images gives a map.
