@@ -161,7 +161,7 @@ pub(crate) fn with_evidence(
 /// # Errors
 /// [`LatticeError::OneOfMany`]: other peaks of the image could form a lattice as well. [`LatticeError::NotPredicted`]: it does not predict held-out
 /// pixels. [`LatticeError::Distorted`]: its cell is too far from a hexagon. [`LatticeError::TooFewPeriods`]: fewer than two periods fit across the frame.
-/// [`LatticeError::NowhereTogether`]: it varies too much.
+/// [`LatticeError::NowhereTogether`]: it varies too much. [`LatticeError::NoPeaks`]: its errors are as large as half of its vectors.
 pub(crate) fn accepted(
     mut found: MeasuredLattice,
     geometry: &Geometry,
@@ -177,6 +177,15 @@ pub(crate) fn accepted(
     if found.periods < FEWEST_PERIODS {
         let periods = found.periods;
         return Err(LatticeError::TooFewPeriods { periods });
+    }
+    let pixels = &found.pixels;
+    let is_open = |i: usize| {
+        let variance = pixels.covariance.fixed_view::<2, 2>(2 * i, 2 * i).trace();
+        !(4.0 * variance < pixels.basis.column(i).norm_squared())
+    };
+    if is_open(0) || is_open(1) {
+        let method = Method::Lattice;
+        return Err(LatticeError::NoPeaks { method });
     }
     let change = found.fit.as_ref().and_then(LatticeFit::change);
     if change.is_some_and(|change| change.wavelength.hypot(change.angle) > MOST_CHANGE) {

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use crate::lattice::fit::folded::Folded;
 use crate::lattice::fit::frame::{Basis, Frame};
 use crate::lattice::fit::tables::{Block, LANES, Tables};
+use crate::numbers::MOST_ROUNDS;
 use crate::numbers::interrupt;
 use crate::numbers::median::median;
 use crate::numbers::widest::widest;
@@ -232,7 +233,8 @@ pub(crate) fn look(
 /// Lines that a thread looks at together, at least.
 pub(crate) const AT_ONCE: usize = 32;
 
-/// Takes the best offset off a line, `o = λ (o + mean ψ(r − o))`, and returns it.
+/// Takes the best offset off a line, `o = λ (o + mean ψ(r − o))`, and returns it. The background is corrected by what this leaves over `1 − λ`, which
+/// may be small: the offset has to be exact.
 fn settle(line: &mut [f64], row: usize, frame: &Frame, lines: &LineOffsets, clip: Clip) -> f64 {
     let lambda = lines.lambda[row];
     let mut offset = lines.offset[row];
@@ -240,11 +242,14 @@ fn settle(line: &mut [f64], row: usize, frame: &Frame, lines: &LineOffsets, clip
         return offset;
     }
     let count = frame.present[row] as f64;
-    for _ in 0..4 {
+    for _ in 0..MOST_ROUNDS {
         let before = offset;
-        offset = lambda * (offset + clipped_sum(line, offset, clip) / count);
-        // Without a limit, or nowhere near it, one look is exact.
-        if clip.0.is_infinite() || (offset - before).abs() < 1e-4 * clip.0 {
+        let (sum, cut) = clipped_sum(line, offset, clip);
+        // Newton's step, exact where no pixel changes sides; never farther than what pixels cut off can move it.
+        let held = lambda * cut as f64 / count;
+        let found = (lambda * (offset + sum / count) - held * offset) / (1.0 - held);
+        offset = found.max(before - clip.0).min(before + clip.0);
+        if cut == 0 || (offset - before).abs() < 1e-4 * clip.0 {
             break;
         }
     }
@@ -254,21 +259,30 @@ fn settle(line: &mut [f64], row: usize, frame: &Frame, lines: &LineOffsets, clip
     offset
 }
 
-/// Sum of what counts of the residuals less `offset`, in eight partial sums.
-fn clipped_sum(line: &[f64], offset: f64, clip: Clip) -> f64 {
+/// Sum of what counts of the residuals less `offset`, in eight partial sums, and how many are cut off.
+fn clipped_sum(line: &[f64], offset: f64, clip: Clip) -> (f64, u64) {
     widest(
         #[inline(always)]
         || {
+            let cut = |value: f64| u64::from((value - offset).abs() > clip.0);
             let blocks = line.chunks_exact(8);
             let rest = blocks.remainder().iter();
-            let rest: f64 = rest.map(|v| clip.apply(v - offset)).sum();
-            let mut sums = [0.0; 8];
+            let (mut sum, mut count) = (0.0, 0);
+            for value in rest {
+                sum += clip.apply(value - offset);
+                count += cut(*value);
+            }
+            let (mut sums, mut counts) = ([0.0; 8], [0; 8]);
             for block in blocks {
-                for (sum, value) in sums.iter_mut().zip(block) {
+                for ((sum, count), value) in sums.iter_mut().zip(&mut counts).zip(block) {
                     *sum += clip.apply(value - offset);
+                    *count += cut(*value);
                 }
             }
-            sums.iter().sum::<f64>() + rest
+            (
+                sums.iter().sum::<f64>() + sum,
+                counts.iter().sum::<u64>() + count,
+            )
         },
     )
 }
@@ -337,4 +351,31 @@ pub(crate) fn settled(
         0.0
     };
     SettledLine { offset, kept }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frame::image::Image;
+    use crate::numbers::rng::normals;
+
+    /// Where a step crosses a line, many of its pixels are cut off. The offset fulfils its equation all the same, wherever it starts.
+    #[test]
+    fn offsets_of_lines_that_cross_a_step_are_exact() {
+        for (seed, part) in [0.0, 0.1, 0.3, 0.45, 0.55, 0.8].into_iter().enumerate() {
+            let mut normal = normals(seed as u64, "step", 0);
+            let step = |i: usize| if (i as f64) < 150.0 * part { 9.0 } else { 0.0 };
+            let line: Vec<f64> = (0..150).map(|i| 4.0 + step(i) + normal()).collect();
+            let image = Image::new(1, line.len(), line.clone());
+            let (frame, clip) = (Frame::new(&image), Clip::at(1.0));
+            for (lambda, start) in [(0.9, 0.0), (0.99, 9.0), (0.9999, -20.0)] {
+                let (lambda, offset) = (vec![lambda], vec![start]);
+                let lines = LineOffsets { lambda, offset };
+                let found = settle(&mut line.clone(), 0, &frame, &lines, clip);
+                let kept = line.iter().map(|v| clip.apply(v - found)).sum::<f64>() / 150.0;
+                let miss = lines.lambda[0] * (found + kept) - found;
+                assert!(miss.abs() < 1e-9, "{part} {start}: {miss}");
+            }
+        }
+    }
 }
