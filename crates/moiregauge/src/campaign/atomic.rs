@@ -31,10 +31,11 @@ use crate::numbers::chi2::enlargement;
 use crate::scan::measured::MeasuredScan;
 use crate::settings::knobs::Calibration;
 
-/// A lattice whose size differs from that of the material by more is another one. Chosen by eye.
+/// A lattice whose size differs from that of the material by more is another one. On the scenes of docs/constants.md half and double change no
+/// result.
 const LARGEST_ERROR: f64 = 0.15;
-/// A lattice free of drift that is further from the shape of the material's (`|q|/|p|`) is another one: one axis
-/// stretched by a fifth. Chosen by eye.
+/// A lattice free of drift that is further from the shape of the material's (`|q|/|p|`) is another one: one axis stretched by a fifth. On the scenes
+/// of docs/constants.md half and double change no result.
 const LARGEST_DISTORTION: f64 = 0.1;
 /// Frames up and down that a constant drift does not make of one another to this share contradict each other. Half and
 /// twice as much change no result of docs/constants.md.

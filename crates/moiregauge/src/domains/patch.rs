@@ -5,8 +5,8 @@ use nalgebra::{Matrix6, Vector2, Vector6};
 use crate::frame::blur::blurred;
 use crate::frame::image::Image;
 
-/// Smoothing of the mean node (standard deviation), share of the radius of a patch: less than a node is wide. Chosen
-/// by eye.
+/// Smoothing of the mean node (standard deviation), share of the radius of a patch: less than a node is wide. On the scenes of docs/constants.md half
+/// and double change results by at most 0.21 σ.
 const SMOOTH: f64 = 0.1;
 
 /// An image between its pixels: Catmull–Rom, with slopes. `None` at edges and beside missing pixels.

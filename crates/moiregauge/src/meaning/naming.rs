@@ -19,8 +19,8 @@ use crate::meaning::strengths::WaveStrengths;
 use crate::meaning::tensor::{CLEARLY, known_orientation};
 use crate::settings::knobs::Settings;
 
-/// A solution with no more strain than this, or than twice that of the one reported, is plausible. Chosen by eye; see
-/// docs/constants.md.
+/// A solution with no more strain than this, or than twice that of the one reported, is plausible. On the scenes of docs/constants.md half and double
+/// change results by at most 0.01 σ.
 const PLAUSIBLE_STRAIN: f64 = 0.007;
 /// Amplitude over that of the others below which a wave is not of the first order. Chosen by eye; see
 /// docs/constants.md.

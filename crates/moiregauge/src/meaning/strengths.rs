@@ -14,7 +14,8 @@ const SIGMAS: f64 = 3.0;
 /// A wave that the fit left out is weaker than this many times the noise of an amplitude: it has to earn its place by
 /// Δχ² > 2 ln N, N up to 10⁷, and the noise around it may be half as much again.
 const LEFT_OUT: f64 = 6.0;
-/// Distance from a lattice point (in units of the pair) beyond which a wave is not a harmonic: below half. Chosen by eye.
+/// Distance from a lattice point (in units of the pair) beyond which a wave is not a harmonic: below half. On the scenes of docs/constants.md half
+/// and double change no result.
 const WHOLE: f64 = 0.3;
 
 /// The amplitudes of the waves of a lattice in all images, relative to the power of each.

@@ -25,7 +25,8 @@ const PEAK: f64 = 4.0;
 const LOWEST_CYCLES: f64 = 1.25;
 /// Peaks beyond this many cycles per pixel are noise: fewer than 2.5 pixels per period.
 const HIGHEST_FREQUENCY: f64 = 0.4;
-/// How many peaks are looked at: more than two shells have, and as many of noise. Chosen by eye.
+/// How many peaks are looked at: more than two shells have, and as many of noise. On the scenes of docs/constants.md half and double change results
+/// by at most 0.05 σ.
 const PEAKS: usize = 40;
 /// How many of them may span a lattice: all pairs of them are tried. Chosen by eye.
 pub(crate) const GENERATORS: usize = 16;

@@ -15,7 +15,8 @@ use crate::window::widths::OF_DIFFERENCE;
 
 /// The pilot's window in wavelengths, which are 0.87 of the period of a lattice: about as wide as the pilot of that.
 const PILOT: f64 = 0.75;
-/// Fewest periods of a frame with a carrier, and the length of its cells, periods. Chosen by eye.
+/// Fewest periods of a frame with a carrier, and the length of its cells, periods. On the scenes of docs/constants.md half and double change results
+/// by at most 0.01 σ.
 const CARRIED: f64 = 12.0;
 /// Window of the probes for noise in wavelengths; nodes are half of it apart.
 const PROBE: f64 = 1.3;

@@ -44,11 +44,12 @@ struct Ridge {
 const ON_RIDGE: f64 = 0.15;
 /// ... and cycles per line: the nearer wave of `BESIDE`.
 const CYCLES: f64 = 3.0;
-/// Around the ky of such a harmonic, half of what is found is left at this distance, in lengths of q₁. Chosen by eye.
+/// Around the ky of such a harmonic, half of what is found is left at this distance, in lengths of q₁. On the scenes of docs/constants.md half and
+/// double change results by at most 0.13 σ.
 const KEPT: f64 = 0.35;
 /// The waves per line with which the offsets are compared, cycles: the window spreads offsets to 1.
 const BESIDE: [f64; 2] = [3.0, 5.0];
-/// Lines of which less is there have no offset of their own: half. Chosen by eye.
+/// Lines of which less is there have no offset of their own: half. On the scenes of docs/constants.md half and double change no result.
 const LEAST: f64 = 0.5;
 /// Euler's γ.
 const EULER: f64 = 0.577_215_664_901_532_9;

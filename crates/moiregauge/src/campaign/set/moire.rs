@@ -24,7 +24,8 @@ use crate::settings::knobs::Settings;
 /// Heterostrains of layers on each other stay below a few tenths of a per cent, rarely a per cent; more
 /// than this deserves a word.
 const LARGE_STRAIN: f64 = 0.02;
-/// Layers slide on each other before they hold so much, and two-dimensional crystals break at two or three times that: it is no result. Chosen by eye.
+/// Layers slide on each other before they hold so much, and two-dimensional crystals break at two or three times that: it is no result. On the scenes
+/// of docs/constants.md half and double change no result.
 const MOST_STRAIN: f64 = 0.05;
 /// A period this near to that of a known surface may be that of the surface: four times the calibration that is
 /// assumed.

@@ -20,7 +20,7 @@ const STILL: f64 = 0.03;
 /// Signal over noise of the weakest first harmonic of a lattice, at least, when all are taken off: 25 in power, a
 /// little more than the 20 of the search.
 const WEAKEST: f64 = 5.0;
-/// The same while others are still in the image and count as noise. Chosen by eye; see docs/constants.md.
+/// The same while others are still in the image and count as noise. On the scenes of docs/constants.md half and double change no result.
 const ON_TRIAL: f64 = 1.5;
 /// Lattices whose wave vectors lie within this of each other (cycles per frame) are one: far less than a main lobe.
 const SAME: f64 = 0.3;
