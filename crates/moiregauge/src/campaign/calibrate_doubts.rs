@@ -1,4 +1,4 @@
-//! Doubts about a calibration.
+//! Doubts about a calibration, and what keeps one from being made.
 
 use nalgebra::Vector2;
 
@@ -9,7 +9,7 @@ use crate::caveat::calibrating::CalibrationDoubt;
 use crate::caveat::sets::{Scattered, SetDoubt};
 
 /// χ²/dof of a set or between sets beyond which its scatter deserves a word: errors wrong by 1.4.
-pub(crate) const LARGE_CHI2: f64 = 2.0;
+const LARGE_CHI2: f64 = 2.0;
 
 /// Whether a scanner can be like that.
 pub(crate) fn about_plausibility(

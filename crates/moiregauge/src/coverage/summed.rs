@@ -34,7 +34,7 @@ pub(crate) fn together(lists: [&[Complex64]; 9]) -> Vec<Nine> {
 }
 
 /// Adds values times a tap.
-pub(crate) fn add<T: Summed>(sums: &mut [T], values: &[T], tap: f64) {
+fn add<T: Summed>(sums: &mut [T], values: &[T], tap: f64) {
     widest(
         #[inline(always)]
         || {

@@ -7,11 +7,11 @@ use crate::coverage::patch::unit_cells_per_pixel;
 
 /// Parts of the patch smaller than this share of the largest part are dropped, and so are those of fewer unit cells
 /// than [`SMALLEST_PART`].
-pub(crate) const PART: f64 = 0.05;
+const PART: f64 = 0.05;
 /// See [`PART`].
-pub(crate) const SMALLEST_PART: f64 = 3.0;
+const SMALLEST_PART: f64 = 3.0;
 /// Gaps of fewer unit cells than this are closed: a defect, or noise.
-pub(crate) const SMALLEST_GAP: f64 = 1.5;
+const SMALLEST_GAP: f64 = 1.5;
 
 /// The patch without small gaps and small parts. A gap that is two cells wide, half a period, is a line that went wrong.
 pub(crate) fn tidy(cells: &Cells, inside: &[bool], pair: &Matrix2<f64>) -> Vec<bool> {
@@ -81,7 +81,7 @@ pub(crate) fn shrunk(cells: &Cells, inside: &[bool]) -> Vec<bool> {
 }
 
 /// The connected parts of the cells that are `wanted`.
-pub(crate) fn parts(size: [usize; 2], inside: &[bool], wanted: bool) -> Vec<Vec<usize>> {
+fn parts(size: [usize; 2], inside: &[bool], wanted: bool) -> Vec<Vec<usize>> {
     let [across, up] = size;
     let mut seen = vec![false; inside.len()];
     let mut all = Vec::new();

@@ -51,7 +51,7 @@ pub(crate) fn noise_with_noise(harmonics: &Harmonics) -> f64 {
 }
 
 /// Points along each side of the frame at which the (smooth) window is summed. Chosen by eye.
-pub(crate) const SAMPLES: usize = 48;
+const SAMPLES: usize = 48;
 
 /// The windowed frame and its copies shifted by ±R, sampled along each axis.
 pub(crate) struct Overlap {

@@ -217,3 +217,42 @@ fn is_made_by_many(found: &MeasuredLattice) -> bool {
     let strong = harmonics.filter(|harmonic| harmonic.signal_to_noise.powi(2) > SECOND);
     strong.count() > shells(2).len()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lattice::find::measure;
+    use crate::numbers::rng::normals;
+    use crate::numbers::three::three;
+    use nalgebra::Vector2;
+
+    /// A lattice whose errors are as large as half of its vectors, or no numbers, is refused; the same with its own errors is not.
+    #[test]
+    fn what_is_not_known_to_half_of_itself_is_refused() {
+        let (pair, mut normal) = (Matrix2::new(0.7, 0.35, 0.0, 0.61), normals(1, "open", 0));
+        let value = |i: usize| {
+            let at = Vector2::new((i % 96) as f64, (i / 96) as f64);
+            three(&pair).iter().map(|q| q.dot(&at).cos()).sum::<f64>() + 0.3 * normal()
+        };
+        let image = Image::new(80, 96, (0..96 * 80).map(value).collect());
+        let geometry = Geometry {
+            pixel_to_nm: Matrix2::identity(),
+            origin: Vector2::zeros(),
+            size: [96, 80],
+            covariance: nalgebra::Matrix4::zeros(),
+            from_sensors: false,
+            departure: None,
+        };
+        let found = measure(&image, &geometry, Background::Plane, Method::Lattice).unwrap();
+        assert!(accepted(found.clone(), &geometry).is_ok());
+        for times in [1e12, f64::NAN] {
+            let mut open = found.clone();
+            open.pixels.covariance *= times;
+            let refused = accepted(open, &geometry).err();
+            assert!(
+                matches!(refused, Some(LatticeError::NoPeaks { .. })),
+                "{refused:?}"
+            );
+        }
+    }
+}

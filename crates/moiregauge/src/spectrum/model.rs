@@ -51,7 +51,7 @@ pub(crate) fn summed(
 }
 
 /// Adds a wave to a line: `Re(c (re + i im))`.
-pub(crate) fn add_wave(line: &mut [f64], c: Complex64, [re, im]: [&[f64]; 2]) {
+fn add_wave(line: &mut [f64], c: Complex64, [re, im]: [&[f64]; 2]) {
     widest(
         #[inline(always)]
         || {

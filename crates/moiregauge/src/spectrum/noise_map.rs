@@ -20,7 +20,7 @@ pub(crate) struct NoiseMap {
 /// ...
 pub(crate) const BLOCK_WIDTH: usize = 4;
 /// ... and high, so that 128 bins tell it to a tenth.
-pub(crate) const BLOCK_HEIGHT: usize = 32;
+const BLOCK_HEIGHT: usize = 32;
 
 impl NoiseMap {
     pub(crate) fn new<T: Kept>(spectrum: &Spectrum<T>) -> Self {

@@ -1,4 +1,4 @@
-//! What lattices on one frame take of each other.
+//! How lattices on one frame enlarge the errors of each other.
 
 use nalgebra::{DMatrix, Matrix3, Matrix4, SMatrix, Vector2};
 
@@ -10,7 +10,7 @@ use crate::spectrum::error::LatticeError;
 
 /// Samples per shortest period at which the correlation of lattices is worked out: more than two for the second
 /// order.
-pub(crate) const SAMPLES: f64 = 5.0;
+const SAMPLES: f64 = 5.0;
 
 /// One lattice and what it makes of the image.
 pub(crate) struct Part {
@@ -73,18 +73,13 @@ pub(crate) fn beside_each_other(
 }
 
 /// Number of parameters of a lattice: three phases, four components of wave vectors, amplitudes.
-pub(crate) fn derivatives(fit: &LatticeFit) -> usize {
+fn derivatives(fit: &LatticeFit) -> usize {
     4 + 2 * fit.harmonics.len()
 }
 
 /// Derivatives of the model at a place: by the phases of the first three harmonics, by `(q₁, q₂)` in units of
 /// one over the frame, by the amplitudes of the first three, and by both amplitudes of the others. Returns their number.
-pub(crate) fn differentiate(
-    fit: &LatticeFit,
-    image: &Image,
-    pixel: Vector2<f64>,
-    out: &mut [f64],
-) -> usize {
+fn differentiate(fit: &LatticeFit, image: &Image, pixel: Vector2<f64>, out: &mut [f64]) -> usize {
     let from_centre = pixel - fit.centre;
     let place = from_centre.component_div(&Vector2::new(image.columns as f64, image.rows as f64));
     out[3..7].fill(0.0);
@@ -111,7 +106,7 @@ pub(crate) fn differentiate(
 }
 
 /// `L_b L_a⁻¹` of the Cholesky factors: takes the covariance a to b.
-pub(crate) fn map<const N: usize>(
+fn map<const N: usize>(
     beside: &SMatrix<f64, N, N>,
     alone: &SMatrix<f64, N, N>,
 ) -> Option<SMatrix<f64, N, N>> {
