@@ -123,20 +123,28 @@ class Scene:
             for change in self.on_sample:
                 image = change(image, x, y)
             if frame == 0 and self.has_lattice:
-                self.find_truths(x, y)
+                self.find_truths(image, x, y)
             for change in [*self.by_tip, self.noisy, *self.in_data]:
                 image = change(image)
             made.append(image)
         return made
     def noisy(self, image):
         return image + self.noise * self.random.normal(size=image.shape) + self.offsets * self.random.normal(size=(self.rows, 1))
-    def find_truths(self, x, y):
+    def strength(self, image, x, y, vectors):
+        """Mean amplitude of the three first waves of a moiré in an image, under a Hann window."""
+        window = numpy.outer(*(numpy.hanning(count + 2)[1:-1] for count in image.shape))
+        window /= window.sum()
+        image = image - (window * image).sum()
+        return numpy.mean([abs((window * image * numpy.exp(1j * k)).sum()) for k in self.phases(x, y, vectors)])
+    def find_truths(self, image, x, y):
         where = numpy.ones(x.shape, bool) if self.cover is None else self.cover(x, y)
         bent = numpy.array([[numpy.gradient(k, self.pitch, axis=axis)[where].mean() for axis in (1, 0)] for k in (x, y)])
         self.vectors_seen = self.vectors @ bent
         self.truths = [twist_of(self.vectors_seen, self.orientation)]
         if self.other is not None:
             vectors, orientation, accepted = self.other
+            if accepted is None:  # The stronger of two moirés may be meant.
+                accepted = self.strength(image, x, y, vectors) > self.strength(image, x, y, self.vectors)
             self.other = twist_of(vectors @ bent, orientation)
             self.truths += [self.other] if accepted else []
 
@@ -243,7 +251,11 @@ class Scene:
         at = [lambda k, count=count: (k / self.pitch).astype(int) % count for count in (self.rows, self.columns)]
         self.on_sample.append(lambda image, x, y: image + ground[at[0](y), at[1](x)])
     def walls(self):  # Flat domains between narrow walls.
-        self.pattern = lambda x, y, sharp=self.draw(1, 5), off=self.draw(-0.5, 0.8): 1.2 * numpy.tanh(sharp * (self.any_pattern(x, y) + off))
+        sharp, off = self.draw(1, 5), self.draw(-0.5, 0.8)
+        def pattern(x, y):
+            image = self.any_pattern(x, y)
+            return 1.2 * numpy.tanh(sharp * (image - image.mean() + off))
+        self.pattern = pattern
     def atoms(self):  # The atoms are seen, or what the pixels make of them.
         depth, vectors = self.draw(0.1, 0.5), layer(self.orientation)
         self.on_sample.append(lambda image, x, y: image + depth * sum(map(numpy.cos, self.phases(x, y, vectors))))
@@ -267,7 +279,7 @@ class Scene:
         self.faults.append(f"second {depth:.2f}, cell {1 / scale:.2f}, {math.degrees(angle):.0f}°")
         vectors = scale * self.vectors @ turn(angle).T
         self.on_sample.append(lambda image, x, y: image + depth * sum(map(numpy.cos, self.phases(x, y, vectors))))
-        self.other = (vectors, self.orientation + angle, False)
+        self.other = (vectors, self.orientation + angle, None)
     def grey(self, levels):
         return lambda image: numpy.round((image - numpy.nanmin(image)) / (numpy.nanmax(image) - numpy.nanmin(image)) * (levels - 1))
     def few_levels(self):  # Eight or twelve grey levels, over a slope.

@@ -10,8 +10,8 @@ use crate::lattice::measured::Candidate;
 pub enum LatticeDoubt {
     /// The frame holds few periods.
     #[error(
-        "the vectors are less accurate than their errors say, since only {periods:.1} lattice periods fit across the \
-         frame. {enough} are enough: scan a larger frame"
+        "each spot that differs moves the result, since only {periods:.1} lattice periods fit across the frame. Scan a \
+         larger frame: {enough} periods or more"
     )]
     FewPeriods {
         /// How many across the shorter side.
@@ -256,9 +256,9 @@ fn wavelengths(trace: &[f64; 3], retrace: &[f64; 3]) -> String {
 }
 
 explain! { LatticeDoubt:
-    FewPeriods "few-periods" Warning
-        "The frame holds only a few periods. Lattice, harmonics and background are then hard to separate, and the \
-         vectors are less accurate than their errors say."
+    FewPeriods "few-periods" Note
+        "The frame holds only a few periods. Lattice, harmonics and background are then hard to separate, and each spot \
+         that differs moves the result."
         "Scan a larger frame."
     LinesDisagree "lines-disagree" Warning
         "Trace and retrace of one scan give lattices that differ by more than their errors. The usual causes are \

@@ -40,6 +40,15 @@ pub enum MoireDoubt {
     /// The lattice may be that of atoms or of a surface.
     #[error(transparent)]
     Doubtful(PeriodDoubt),
+    /// The images leave much of the twist open.
+    #[error(
+        "an error of 1 % of the twist is likely: the images leave {:.1} % open (one standard deviation)",
+        100.0 * .share
+    )]
+    TwistImprecise {
+        /// Standard deviation of the twist by the images alone, as a share of it.
+        share: f64,
+    },
     /// The strain may be noise.
     #[error(
         "quote an upper limit of the heterostrain: it is below {:.4} % with 95 % confidence, and its axis is not \
@@ -161,6 +170,9 @@ explain! { MoireDoubt:
         "The period is that of a known surface, or very short for a moiré. If the images show atoms or a surface, \
          twist and strain mean nothing."
         "Look at the image. If it shows a moiré, name its layers."
+    TwistImprecise "twist-imprecise" Warning
+        "Noise, few periods, or spots that differ leave more than 1 % of the twist open, as one standard deviation."
+        "Scan a larger frame, or take more frames of the place."
     StrainNotSignificant "strain-not-significant" Note
         "The heterostrain is not significantly different from zero. The result is its upper limit. Its axis is not \
          known."

@@ -194,7 +194,7 @@ fn scattered(of: Scattered, chi2_per_dof: f64, share: Option<f64>) -> String {
 }
 
 explain! { SetDoubt:
-    ChangeOfScanner "change-of-scanner" Warning
+    ChangeOfScanner "change-of-scanner" Note
         "No position sensor says how the scanner bends, and hysteresis of a usual size makes as large a change of the lattice. The mean over a whole frame \
          hardly changes; the budget has the effect on a part of the frame."
         "Record the position sensors, or scan the place again turned by 90°: a change that turns with the frame is the scanner's."
@@ -217,7 +217,7 @@ explain! { SetDoubt:
         "The scans of a set differ from each other by more than their errors say. The errors of the set were enlarged to \
          match."
         "Look for the scan that stands out, and for a drift that changes. Take more frames."
-    OutsideOnePercent "outside-one-percent" Warning
+    OutsideOnePercent "outside-one-percent" Note
         "A wavelength of at least one scan is more than 1 % away from that of the set."
         "Look at that scan: few periods, a jump or another place."
     OutlyingScan "outlying-scan" Warning

@@ -9,7 +9,7 @@ use crate::lattice::beside::without_waves;
 use crate::lattice::ground::below;
 use crate::lattice::measure::{measure_clipped, measure_evened, measure_levelled};
 use crate::lattice::measured::MeasuredLattice;
-use crate::lattice::predicted::{LEAST, best_predicted, judged};
+use crate::lattice::predicted::{LEAST, best_predicted, judged, with_evidence};
 use crate::spectrum::error::LatticeError;
 use crate::spectrum::method::Method;
 use crate::spectrum::prepare::levelled;
@@ -65,7 +65,13 @@ pub(crate) fn measure_own(
     };
     let by_peaks_below = |even: &Arc<Image>, side| {
         let found = measure_evened(even, geometry, background, side).ok()?;
-        freed(even, found).ok().filter(surely)
+        let mut found = freed(even, found).ok().filter(surely)?;
+        // What was taken off as ground may be a lattice, too.
+        let (whole, _) = with_evidence(found.clone(), &image, geometry);
+        if let (Some(own), Some(whole)) = (&mut found.evidence, whole.evidence) {
+            own.candidates = whole.candidates;
+        }
+        Some(found)
     };
     let found = measure_levelled(&image, geometry, background, method);
     found

@@ -32,7 +32,7 @@ const SHARES: [f64; 2] = [0.3, 0.15];
 const SMALLEST: f64 = 12.0;
 /// The window of the ground below a known lattice, in periods: a hidden first shell, longer by √3, is left.
 const PERIODS: f64 = 2.0;
-/// The widest window, as a share of the shorter side of the frame: lattices of fewer than four periods cannot be told from ground.
+/// The widest window, as a share of the shorter side of the frame: of fewer than four periods a window takes a part, so that none is taken off.
 const WIDEST: f64 = 0.5;
 /// Rounds of lattice and ground: the second changes the waves by less than a tenth of their errors.
 const ROUNDS: usize = 2;
@@ -78,15 +78,18 @@ fn on_even_ground(
     for _ in 0..ROUNDS {
         let waves = found.fit.as_ref()?.wave_vectors.basis;
         let part = found.patch.as_ref();
-        let (even, side) = evened(image, signs, found.fit.as_ref()?, part);
-        if side as f64 > WIDEST * size[0].min(size[1]) as f64 {
-            return None;
-        }
+        let side = window(&waves);
+        let is_told = side as f64 <= WIDEST * size[0].min(size[1]) as f64;
+        let even = if is_told {
+            evened(image, signs, found.fit.as_ref()?, part)
+        } else {
+            turned(image, signs)
+        };
         let mut again = measure_pair(&waves, part, &even, geometry, background, Method::Lattice)?;
         if !same(size, &again.reciprocal, &waves) {
             return None;
         }
-        again.ground = Some(side as f64);
+        again.ground = is_told.then_some(side as f64);
         again.evidence.clone_from(&before.evidence);
         again.larger = before.larger;
         found = again;
@@ -105,21 +108,22 @@ pub(crate) fn even_image(
     let start = Start::at(&even, geometry, background, pair)?;
     let found = start.measure(Method::Lattice).ok()?;
     let signs = vec![1.0; image.rows];
-    let fit = on_even_ground(image, &signs, &found, geometry, background)?.fit?;
-    Some(evened(image, &signs, &fit, None).0)
+    let found = on_even_ground(image, &signs, &found, geometry, background)?;
+    let fit = found.ground.and(found.fit)?;
+    Some(evened(image, &signs, &fit, None))
 }
 
-/// The image without the running median of what the fitted lattice leaves, and the window of that, pixels. `part`: where the lattice is.
+/// The image without the running median of what the fitted lattice leaves. `part`: where the lattice is.
 fn evened(
     image: &Image,
     signs: &[f64],
     fit: &LatticeFit,
     part: Option<&LatticeRegion>,
-) -> (Image, usize) {
+) -> Image {
     let lattice = turned(&picture(fit, [image.columns, image.rows], part), signs);
     let side = window(&fit.wave_vectors.basis);
     let ground = running_median(&without(image, &lattice), side);
-    (turned(&without(image, &ground), signs), side)
+    turned(&without(image, &ground), signs)
 }
 
 /// A window in periods of the longest of three waves, pixels.

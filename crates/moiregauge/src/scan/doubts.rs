@@ -18,7 +18,7 @@ use crate::numbers::chi2;
 use crate::numbers::three::three;
 use crate::scan::measured::MeasuredLine;
 
-/// Fewer periods than this across the shorter side deserve a warning: of 100 pictures of 2.6 to 5 periods with spots that differ the errors were right (rms
+/// Fewer periods than this across the shorter side deserve a word: of 100 pictures of 2.6 to 5 periods with spots that differ the errors were right (rms
 /// pull 0.75 and 0.99), and fewer were not drawn. See docs/constants.md.
 const FEW_PERIODS: f64 = 2.5;
 /// Trace and retrace whose lattices differ by more than this share do not show the same one. Half and twice as much

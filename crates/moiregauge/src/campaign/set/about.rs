@@ -2,7 +2,7 @@
 
 use crate::campaign::analysis::{ScanAnalysis, SetAnalysis};
 use crate::campaign::means::SetMean;
-use crate::campaign::set::mean::counted;
+use crate::campaign::set::mean::{ONE_PERCENT, counted};
 use crate::campaign::set::moire;
 use crate::campaign::set::ruler::is_contradicted;
 use crate::caveat::Caveat;
@@ -27,6 +27,7 @@ pub(crate) fn about_set(
     about_scatter(set, caveats);
     about_mean(&set.name, set.mean.as_ref(), caveats);
     let shown = set.mean.as_ref().or(set.uncorrected.as_ref());
+    about_twist(&set.name, shown, caveats);
     let ruler = set.ruler.as_ref();
     let of_several = settings.moires > 1 && settings.ruler == RulerLayer::Auto;
     if ruler.is_some() && of_several {
@@ -143,6 +144,15 @@ fn about_mean(name: &str, mean: Option<&SetMean>, caveats: &mut Vec<Caveat>) {
             },
             name,
         ));
+    }
+}
+
+/// Says where the images alone leave much of the twist open.
+fn about_twist(name: &str, shown: Option<&SetMean>, caveats: &mut Vec<Caveat>) {
+    let twist = shown.map(|mean| mean.twist_strain.twist());
+    let share = twist.map(|twist| twist.sigma / twist.value.abs());
+    if let Some(share) = share.filter(|share| *share > ONE_PERCENT) {
+        caveats.push(Caveat::new(MoireDoubt::TwistImprecise { share }, name));
     }
 }
 

@@ -20,6 +20,9 @@ use crate::numbers::chi2::enlargement;
 use crate::numbers::spread::mean_and_spread;
 use crate::settings::knobs::Settings;
 
+/// Twist and wavelengths are given to this share by published scans (arXiv 2406.08681).
+pub(crate) const ONE_PERCENT: f64 = 0.01;
+
 /// The scans that are not left out.
 pub(crate) fn counted(scans: &[ScanAnalysis]) -> impl Iterator<Item = &ScanAnalysis> {
     scans.iter().filter(|s| s.excluded.is_none())
@@ -132,7 +135,7 @@ fn set_mean(
     let within = lattices.iter().all(|l| {
         (0..3).all(|i| {
             let ratio = l.wavelength(i).value / lattice.wavelength(i).value;
-            (ratio - 1.0).abs() <= 0.01
+            (ratio - 1.0).abs() <= ONE_PERCENT
         })
     });
     let budget = Budget::with_grid(lattice, &twist_strain, statistical, grid, settings);
