@@ -215,16 +215,21 @@ pub(crate) fn superlattice(
         let without = of(&|i| is_fine(indices[i]) || !in_line(indices[i], *first))?;
         Some(errors(&large, &without))
     };
-    let predicts = errors(&large, &small);
     let first: Vec<[i32; 2]> = FIRST_SHELL
         .into_iter()
         .filter(|i| !is_fine(*i) && tells(i))
         .collect();
-    if predicts < BETTER || first.len() < 2 {
+    let predicts = errors(&large, &small);
+    if first.len() < 2 {
         return Some(Superlattice::NotShown(predicts));
     }
     let adds: Option<Vec<f64>> = first.iter().map(adds).collect();
     let least = adds?.into_iter().fold(f64::INFINITY, f64::min);
+    // Where they beat, the sum of several waves differs from block to block more than each.
+    let predicts = predicts.max(least);
+    if predicts < BETTER {
+        return Some(Superlattice::NotShown(predicts));
+    }
     if least < 0.0 {
         return Some(Superlattice::NotShown(0.0));
     }

@@ -124,6 +124,23 @@ fn gains_of_lines_make_no_superlattice() {
     assert!(found.value < 3.0 * error, "{found:?}");
 }
 
+/// Few cells of a superlattice: its waves of two directions beat, and what they predict differs more between bands of lines than what each does.
+#[test]
+fn waves_that_beat_make_a_superlattice() {
+    let [x, y] = SIZE.map(|n| TAU / n as f64);
+    let coarse = Matrix2::new(3.95 * x, 0.07 * x, 1.5 * y, 3.0 * y);
+    let fine = Supercell::Double.fine(&coarse);
+    for seed in 0..10 {
+        let value =
+            |first: f64| move |at: Vector2<f64>| lattice(&fine, at) + first * lattice(&coarse, at);
+        let shown = |image: &Image| superlattice(image, &coarse, Supercell::Double, false).unwrap();
+        let found = shown(&image(seed, 0.2, value(0.2)));
+        assert_eq!(found, Superlattice::Shown, "{seed}");
+        let alone = shown(&image(seed, 0.2, value(0.0)));
+        assert!(alone != Superlattice::Shown, "{seed}: {alone:?}");
+    }
+}
+
 /// Waves that stand along the slow axis have less than a cycle along the lines: offsets of the lines look the same. They neither make a superlattice nor
 /// hide one, which has waves in other directions.
 #[test]

@@ -114,12 +114,7 @@ pub(crate) fn even_image(
 }
 
 /// The image without the running median of what the fitted lattice leaves. `part`: where the lattice is.
-fn evened(
-    image: &Image,
-    signs: &[f64],
-    fit: &LatticeFit,
-    part: Option<&LatticeRegion>,
-) -> Image {
+fn evened(image: &Image, signs: &[f64], fit: &LatticeFit, part: Option<&LatticeRegion>) -> Image {
     let lattice = turned(&picture(fit, [image.columns, image.rows], part), signs);
     let side = window(&fit.wave_vectors.basis);
     let ground = running_median(&without(image, &lattice), side);
@@ -281,6 +276,36 @@ mod tests {
         assert!(10 * answered >= 9 * 3 * SEEDS, "{answered}");
         let pull = (sum / answered as f64).sqrt();
         assert!((0.4..1.6).contains(&pull), "{pull}");
+    }
+
+    /// A window of a lattice of fewer than four periods is wider than half of the frame: none is taken off, and the waves are those of the lattice.
+    #[test]
+    fn few_periods_keep_their_ground() {
+        let geometry = Geometry::of_pitch(SIZE, [0.25, 0.25], 0.0, Vector2::zeros()).unwrap();
+        let background = Background::Plane;
+        for (stretch, is_taken) in [(1.0, true), (0.55, false)] {
+            let waves = stretch * pair(0);
+            let mut normal = normals(3, "few", 0);
+            let value = |i: usize| {
+                let at = Vector2::new((i % SIZE[0]) as f64, (i / SIZE[0]) as f64);
+                three(&waves).map(|q| q.dot(&at).cos()).iter().sum::<f64>() + 0.3 * normal()
+            };
+            let image = Image::new(
+                SIZE[1],
+                SIZE[0],
+                (0..SIZE[0] * SIZE[1]).map(value).collect(),
+            );
+            let start = Start::at(&image, &geometry, background, &waves).unwrap();
+            let found = start.measure(Method::Lattice).unwrap();
+            let signs = vec![1.0; SIZE[1]];
+            let found = on_even_ground(&image, &signs, &found, &geometry, background).unwrap();
+            assert_eq!(found.ground.is_some(), is_taken, "{stretch}");
+            let fit = found.fit.unwrap();
+            let names = (waves.try_inverse().unwrap() * fit.wave_vectors.basis).map(f64::round);
+            let error = fit.wave_vectors.basis - waves * names;
+            let pull = (error.norm_squared() / fit.wave_vectors.covariance.trace()).sqrt();
+            assert!(pull < 2.5, "{stretch}: {pull}");
+        }
     }
 
     /// What is taken off makes no lattice of steps, bumps and noise.

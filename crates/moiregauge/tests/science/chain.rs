@@ -485,3 +485,17 @@ fn strain_within_calibration_is_pointed_out() {
     settings.calibration.orthogonality_mrad = 0.1;
     assert!(!codes(&analyse_frames(&scans, &settings)).contains(&code));
 }
+
+/// Sensors whose noise leaves several per cent of the twist open, and what says so; the noise of good ones does not.
+#[test]
+fn a_twist_that_is_open_by_one_per_cent_is_pointed_out() {
+    for (sensor_nm, is_open) in [(0.2, false), (120.0, true)] {
+        let mut simulation = small_set(5);
+        simulation.noise.sensor_nm = sensor_nm;
+        let found = analyse_frames(&frames(&simulation), &quick(Method::Lattice));
+        let mean = found.sets[0].mean.as_ref().unwrap();
+        let twist = mean.twist_strain.twist();
+        assert_eq!(twist.sigma > 0.01 * twist.value, is_open, "{twist:?}");
+        assert_eq!(codes(&found).contains(&"twist-imprecise"), is_open);
+    }
+}
