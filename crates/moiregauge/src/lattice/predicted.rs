@@ -17,7 +17,7 @@ use crate::spectrum::error::{LatticeError, SECOND};
 use crate::spectrum::method::Method;
 use crate::spectrum::prepare::binned;
 use crate::spectrum::rivals::{ENOUGH, Rivals};
-use crate::spectrum::select::{MOST_DISTORTION, candidates_beside};
+use crate::spectrum::select::{FEWEST_PERIODS, MOST_DISTORTION, candidates_beside};
 use crate::spectrum::shells::shells;
 use crate::spectrum::transform::Spectrum;
 
@@ -30,9 +30,6 @@ pub(crate) const LEAST: f64 = 1.5;
 /// Largest relative change of the waves from corner to corner: gradients and waves of twist and strain make up
 /// to a tenth, creep in a frame of four periods of atoms a half, and holes that pass for a coarse lattice 0.7 to 1.4.
 const MOST_CHANGE: f64 = 0.6;
-/// Fewest periods across the frame: a few protrusions can mimic a lattice. Of simulated discs with sharp edges 0.8 to 1.0 fit across the
-/// frame, of the smallest recorded images three; a cell √3 times too large with 1.6 was taken for a lattice in one of 400 frames of few spots.
-const FEWEST_PERIODS: f64 = 2.0;
 
 /// The lattice with several times the cell, or a part of it, that predicts the image better than the one that was found; that one if none does.
 pub(crate) fn of_better_cell(

@@ -12,7 +12,6 @@ use heterostrain::lattice::{distortion, shortest_pair};
 use nalgebra::{Matrix2, Vector2};
 
 use crate::numbers::interrupt;
-use crate::numbers::three::three;
 use crate::spectrum::noise_map::{BLOCK_WIDTH, NoiseMap};
 use crate::spectrum::rivals::{ENOUGH, Rivals};
 use crate::spectrum::transform::Spectrum;
@@ -38,6 +37,10 @@ const ORDERS: f64 = 4.0;
 /// A moiré of hexagonal layers is a hexagon distorted by less than this; see [`distortion`]. Beyond, other pairs of
 /// the lattice are nearer to a hexagon.
 pub(crate) const MOST_DISTORTION: f64 = 0.45;
+
+/// Fewest periods across the frame: a few protrusions can mimic a lattice. Of simulated discs with sharp edges 0.8 to 1.0 fit across the
+/// frame, of the smallest recorded images three; a cell √3 times too large with 1.6 was taken for a lattice in one of 400 frames of few spots.
+pub(crate) const FEWEST_PERIODS: f64 = 2.0;
 
 /// A lattice proposed by the spectrum.
 #[derive(Clone, Copy, Debug)]
@@ -142,6 +145,14 @@ pub(crate) fn frame_cycles(spectrum: &Spectrum) -> Matrix2<f64> {
     Matrix2::from_diagonal(&Vector2::new(w as f64, h as f64)) / TAU
 }
 
+/// Periods of a lattice (reciprocal pair, cycles per frame) along the longest of its three vectors; `None` where it has none.
+pub(crate) fn periods(cycles: &Matrix2<f64>) -> Option<f64> {
+    let real = cycles.try_inverse()?.transpose();
+    let (a, b) = (real.column(0), real.column(1));
+    let third = (a + b).norm().min((a - b).norm());
+    Some(1.0 / a.norm().max(b.norm()).max(third))
+}
+
 /// Labels the pair canonically, refines it with the peaks it explains, and scores it.
 fn assess(
     pair: &Matrix2<f64>,
@@ -161,16 +172,13 @@ fn assess(
         pair *= Matrix2::new(0.0, -1.0, 1.0, 1.0);
     }
     let frame = frame_cycles(spectrum);
-    let may_be = |pair: &Matrix2<f64>| {
-        let shortest = three(&(frame * pair)).map(|wave| wave.norm());
-        let shortest = shortest.into_iter().fold(f64::INFINITY, f64::min);
-        shortest >= LOWEST_CYCLES && distortion(&(to_physical * pair)) <= MOST_DISTORTION
-    };
+    let may_be = |pair: &Matrix2<f64>| distortion(&(to_physical * pair)) <= MOST_DISTORTION;
     if !may_be(&pair) {
         return None;
     }
     let candidate = score(&pair, peaks, spectrum, Orders(ORDERS))?;
-    may_be(&candidate.pair).then_some(Candidate {
+    let repeats = periods(&(frame * candidate.pair))? >= FEWEST_PERIODS;
+    (repeats && may_be(&candidate.pair)).then_some(Candidate {
         score: candidate.score * (1.0 - distortion(&(to_physical * candidate.pair)).powi(2)),
         ..candidate
     })

@@ -16,6 +16,7 @@ use crate::spectrum::harmonics::Harmonics;
 use crate::spectrum::method::Method;
 use crate::spectrum::phases::Phases;
 use crate::spectrum::prepare::{Prepared, middle, phases};
+use crate::spectrum::select::periods;
 use crate::spectrum::verdict::signal_to_noise;
 
 /// What a method sees.
@@ -201,10 +202,10 @@ impl Start {
             }
             None => Vector2::new(self.size[0] as f64, self.size[1] as f64),
         };
-        let longest = (0..3)
-            .map(|i| pixels.vector(i))
-            .map(|v| (v.x / size.x).hypot(v.y / size.y));
-        1.0 / longest.fold(0.0, f64::max)
+        let real = Matrix2::from_diagonal(&size.map(f64::recip)) * pixels.basis;
+        real.try_inverse()
+            .and_then(|cycles| periods(&cycles.transpose()))
+            .unwrap_or(0.0)
     }
 }
 
