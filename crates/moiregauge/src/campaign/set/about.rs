@@ -10,6 +10,7 @@ use crate::caveat::moires::MoireDoubt;
 use crate::caveat::orientation::{OrientationDoubt, SenseNumbers};
 use crate::caveat::sets::{Scattered, SetDoubt};
 use crate::meaning::about::caveats;
+use crate::meaning::budget::Source;
 use crate::settings::knobs::{RulerLayer, Settings};
 
 /// χ²/dof beyond which the scatter of the scans deserves a word: errors wrong by 1.4.
@@ -147,11 +148,14 @@ fn about_mean(name: &str, mean: Option<&SetMean>, caveats: &mut Vec<Caveat>) {
     }
 }
 
-/// Says where the images alone leave much of the twist open.
+/// Says where the images, at a known drift, leave much of the twist open.
 fn about_twist(name: &str, shown: Option<&SetMean>, caveats: &mut Vec<Caveat>) {
-    let twist = shown.map(|mean| mean.twist_strain.twist());
-    let share = twist.map(|twist| twist.sigma / twist.value.abs());
-    if let Some(share) = share.filter(|share| *share > ONE_PERCENT) {
+    let open = |mean: &SetMean| {
+        let images = |source| matches!(source, Source::Image | Source::Sensor);
+        let variance = mean.budget.sum(images).covariance.m11;
+        variance.sqrt() / mean.twist_strain.twist.abs()
+    };
+    if let Some(share) = shown.map(open).filter(|share| *share > ONE_PERCENT) {
         caveats.push(Caveat::new(MoireDoubt::TwistImprecise { share }, name));
     }
 }
