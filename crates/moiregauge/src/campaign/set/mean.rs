@@ -20,7 +20,8 @@ use crate::numbers::chi2::enlargement;
 use crate::numbers::spread::mean_and_spread;
 use crate::settings::knobs::Settings;
 
-/// Twist and wavelengths are given to this share by published scans (arXiv 2406.08681).
+/// Scans are compared with their set to this share, and a twist of which the images leave more open has a warning: it is that of the gain of a scanner that nobody
+/// calibrated.
 pub(crate) const ONE_PERCENT: f64 = 0.01;
 
 /// The scans that are not left out.
