@@ -32,7 +32,7 @@ const SHARES: [f64; 2] = [0.3, 0.15];
 const SMALLEST: f64 = 12.0;
 /// The window of the ground below a known lattice, in periods: a hidden first shell, longer by √3, is left.
 const PERIODS: f64 = 2.0;
-/// The widest window, as a share of the shorter side of the frame: of fewer than four periods a window takes a part, so that none is taken off.
+/// The widest window, as a share of the shorter side of the frame. A lattice of fewer than four periods is wider: its ground is not taken off.
 const WIDEST: f64 = 0.5;
 /// Rounds of lattice and ground: the second changes the waves by less than a tenth of their errors.
 const ROUNDS: usize = 2;

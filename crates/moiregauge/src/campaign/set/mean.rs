@@ -20,8 +20,8 @@ use crate::numbers::chi2::enlargement;
 use crate::numbers::spread::mean_and_spread;
 use crate::settings::knobs::Settings;
 
-/// Scans are compared with their set to this share, and a twist of which the images leave more open has a warning: it is that of the gain of a scanner that nobody
-/// calibrated.
+/// Scans are compared with their set to this share. A twist of which the images leave more open has a warning. It is the gain error that an
+/// uncalibrated scanner is assumed to have.
 pub(crate) const ONE_PERCENT: f64 = 0.01;
 
 /// The scans that are not left out.
