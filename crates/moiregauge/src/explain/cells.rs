@@ -15,6 +15,7 @@ use crate::explain::evidence::{BETTER, Blocks, gain, weakest};
 use crate::explain::normal::gains;
 use crate::explain::phases::Phases;
 use crate::explain::scene::Scene;
+use crate::frame::background::{Background, remove_background};
 use crate::frame::image::Image;
 use crate::numbers::three::three;
 use crate::spectrum::shells::FIRST_SHELL;
@@ -94,16 +95,7 @@ pub(crate) fn better_cell(image: &Image, pair: &Matrix2<f64>, bends: bool) -> Ne
     let elongated = is_elongated(pair);
     let rows = (0..3).map(Supercell::Rows).filter(|_| elongated);
     let all = all.into_iter().chain(rows);
-    // Shown by straight waves or, where the lattice changes, by bent ones.
-    let shows = |coarse: &Matrix2<f64>, supercell| {
-        let straight = superlattice(image, coarse, supercell, false);
-        let bent = || superlattice(image, coarse, supercell, true);
-        if bends && straight != Some(Superlattice::Shown) {
-            bent()
-        } else {
-            straight
-        }
-    };
+    let shows = |coarse: &Matrix2<f64>, supercell| shows(image, coarse, supercell, bends);
     let coarse = all.clone();
     let coarse = coarse.filter_map(|supercell| Some((supercell, supercell.coarse(pair)?)));
     let coarse: Vec<(Supercell, Matrix2<f64>)> = coarse.collect();
@@ -138,6 +130,38 @@ pub(crate) fn better_cell(image: &Image, pair: &Matrix2<f64>, bends: bool) -> Ne
     Nested { better, larger }
 }
 
+/// What an image shows of a superlattice by straight waves or, where it `bends`, by bent ones.
+fn shows(
+    image: &Image,
+    coarse: &Matrix2<f64>,
+    supercell: Supercell,
+    bends: bool,
+) -> Option<Superlattice> {
+    let straight = superlattice(image, coarse, supercell, false);
+    if bends && straight != Some(Superlattice::Shown) {
+        superlattice(image, coarse, supercell, true)
+    } else {
+        straight
+    }
+}
+
+/// By how many standard errors, at least, all waves of a superlattice (reciprocal pair, rad per pixel) predict held-out pixels: those that it has in
+/// common with a smaller cell, and those that show it. `None` where it is not shown.
+pub(crate) fn predicted_superlattice(
+    image: &Image,
+    pair: &Matrix2<f64>,
+    bends: bool,
+) -> Option<f64> {
+    let of = |cell: Supercell| {
+        let least = weakest(image, &cell.fine(pair), bends)?;
+        let shown = least > BETTER && shows(image, pair, cell, bends) == Some(Superlattice::Shown);
+        shown.then_some(BETTER)
+    };
+    [Supercell::Root3, Supercell::Double]
+        .into_iter()
+        .find_map(of)
+}
+
 /// Whether the longest of the three first-order waves has more than one and a half times the wave vector of the shortest.
 fn is_elongated(pair: &Matrix2<f64>) -> bool {
     let Some(change) = shortest_pair(pair) else {
@@ -169,9 +193,30 @@ pub(crate) enum Superlattice {
     NotShown(f64),
 }
 
-/// Whether an image shows the lattice with the larger cell and not only that with the smaller. `coarse`: reciprocal pair of the larger cell, at 60°,
-/// rad per pixel; `image`: without its background; `bends`: phases may be cubic polynomials. `None` where the two cannot be compared.
+/// Whether an image shows the lattice with the larger cell and not only that with the smaller; if perhaps, the image without the means of its lines as
+/// well. `coarse`: reciprocal pair of the larger cell, at 60°, rad per pixel; `image`: without its background; `bends`: phases may be cubic polynomials.
+/// `None` where the two cannot be compared.
 pub(crate) fn superlattice(
+    image: &Image,
+    coarse: &Matrix2<f64>,
+    supercell: Supercell,
+    bends: bool,
+) -> Option<Superlattice> {
+    use Superlattice::{NotShown, Shown};
+    let of = |image: &Image| of_image(image, coarse, supercell, bends);
+    let plain = of(image)?;
+    Some(match plain {
+        NotShown(by) if by > EACH => match of(&remove_background(image, Background::LineMean)) {
+            Some(Shown) => Shown,
+            Some(NotShown(level)) => NotShown(by.max(level)),
+            None => plain,
+        },
+        _ => plain,
+    })
+}
+
+/// The same as the image is.
+fn of_image(
     image: &Image,
     coarse: &Matrix2<f64>,
     supercell: Supercell,

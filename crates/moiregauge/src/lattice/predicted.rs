@@ -4,7 +4,7 @@ use heterostrain::lattice::distortion;
 use nalgebra::Matrix2;
 
 use crate::explain::beside::wave_beside;
-use crate::explain::cells::better_cell;
+use crate::explain::cells::{better_cell, predicted_superlattice};
 use crate::explain::evidence::{BETTER, gain, proposed, weakest};
 use crate::explain::table::{Row, table};
 use crate::frame::background::Background;
@@ -67,7 +67,8 @@ pub(crate) fn best_predicted(
         .max_by(|a, b| a.1.total_cmp(&b.1))?;
     let predicts = weakest > BEYOND_DOUBT;
     let start = predicts.then(|| Start::at(image, geometry, background, &pair))??;
-    start.measure(Method::Lattice).ok()
+    let (found, method) = (start.measure(Method::Lattice).ok()?, Method::Lattice);
+    Some(of_better_cell(found, image, geometry, background, method))
 }
 
 /// The lattice `found` with its evidence, or a proposed lattice that predicts the lattice region better.
@@ -143,8 +144,15 @@ pub(crate) fn with_evidence(
         behind: -larger.predicts,
     });
     let doubtful = doubtful.map(|row| Candidate::new(&row, &to_physical));
+    let own = weakest(part, &found.reciprocal, bends);
+    // Of a superlattice with faint waves one direction may drown in offsets of lines.
+    let predicts = own.map(|own| {
+        let shown = || predicted_superlattice(part, &found.reciprocal, bends);
+        let shown = if own < LEAST { shown() } else { None };
+        shown.unwrap_or(own)
+    });
     found.evidence = Some(Evidence {
-        predicts: weakest(part, &found.reciprocal, bends),
+        predicts,
         rivals,
         larger: found.larger.map(|l| l.map_or(0.0, |l| l.predicts)),
         candidates: candidates.chain(doubtful).collect(),

@@ -260,7 +260,7 @@ fn images_of_a_set_agree_on_a_first_shell() {
 /// its copy have a mean, and the copy is named once.
 #[test]
 fn a_copy_of_a_frame_whose_lines_disagree_counts_once() {
-    let (simulator, _) = varied("second-shell+edge", 192, 6);
+    let (simulator, _) = varied("second-shell+edge", 192, 10);
     let settings = undrawn();
     let scan = simulator.frame(0);
     let of = |name: &str| measure_scan(name, &scan, &settings, None).unwrap();
