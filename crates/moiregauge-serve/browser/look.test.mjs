@@ -1,10 +1,11 @@
 // Look: load, files, images, contrast, profile, pictures, names that hold script.
 
 import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
 import { copyFileSync, mkdirSync, readFileSync } from "node:fs";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
-import { closeBrowser, open, openFolder, rootWith, scansOf, serve, simulated, WORK } from "./harness.mjs";
+import { closeBrowser, open, openFolder, PROGRAM, rootWith, scansOf, serve, simulated, WORK } from "./harness.mjs";
 
 /** @type {Awaited<ReturnType<typeof serve>>} */
 let server;
@@ -94,11 +95,14 @@ test("pictures are saved as PNG and SVG", async () => {
   await page.leave();
 });
 
-test("the first picture of a dropped file comes within 0.3 s", async () => {
+test("the first picture of a dropped file comes within six times what the program needs to look at it", async () => {
   const file = scansOf(simulated("full", ["--scans", "1", "--pixels", "512"]))[0];
   const page = await open(server.url);
-  const took = [];
+  const [took, read] = [[], []];
   for (let n = 0; n < 3; n++) {
+    const before = performance.now();
+    execFileSync(PROGRAM, ["info", file]);
+    read.push(performance.now() - before);
     const data = readFileSync(file).toString("base64");
     const transfer = await page.evaluateHandle(async (text) => {
       const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
@@ -116,8 +120,9 @@ test("the first picture of a dropped file comes within 0.3 s", async () => {
     took.push(await page.evaluate(() => performance.getEntriesByName("picture")[0].startTime - performance.getEntriesByName("drop")[0].startTime));
     await page.evaluate(() => performance.clearMarks("drop"));
   }
-  console.log(`first picture after ${took.map((t) => t.toFixed(0)).join(", ")} ms`);
-  assert.ok(Math.min(...took) < 300, `${took} ms`);
+  const told = [took, read].map((times) => times.map((t) => t.toFixed(0)).join(", "));
+  console.log(`first picture after ${told[0]} ms, info after ${told[1]} ms`);
+  assert.ok(Math.min(...took) < 6 * Math.min(...read), `${told}`);
   assert.match(await page.locator(".viewer-title").innerText(), /^dropped\.spm/);
   await page.getByText("3 scans chosen").waitFor();
   assert.deepEqual(page.wrong, []);
