@@ -193,9 +193,9 @@ pub(crate) enum Superlattice {
     NotShown(f64),
 }
 
-/// Whether an image shows the lattice with the larger cell and not only that with the smaller; if perhaps, the image without the means of its lines as
-/// well. `coarse`: reciprocal pair of the larger cell, at 60°, rad per pixel; `image`: without its background; `bends`: phases may be cubic polynomials.
-/// `None` where the two cannot be compared.
+/// Whether an image shows the lattice with the larger cell and not only that with the smaller. Where offsets of lines may hide it, the image is looked at
+/// without the means of its lines as well. `coarse`: reciprocal pair of the larger cell, at 60°, rad per pixel; `image`: without its background; `bends`:
+/// phases may be cubic polynomials. `None` where the two cannot be compared.
 pub(crate) fn superlattice(
     image: &Image,
     coarse: &Matrix2<f64>,

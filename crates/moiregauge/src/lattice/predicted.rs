@@ -260,4 +260,34 @@ mod tests {
             );
         }
     }
+
+    /// A first shell of 3 % of the second, of which one wave runs across the lines and drowns in their offsets: the larger cell is found.
+    #[test]
+    fn offsets_of_lines_hide_no_superlattice() {
+        let pair = Matrix2::new(0.2578, 0.0061, 0.1265, 0.2918);
+        let [columns, rows] = [208, 192];
+        for seed in 0..3 {
+            let mut normal = normals(seed, "faint", 0);
+            let offsets: Vec<f64> = (0..rows).map(|_| 0.4 * normal()).collect();
+            let value = |i: usize| {
+                let at = Vector2::new((i % columns) as f64, (i / columns) as f64);
+                let [a, b] = [0, 1].map(|j| pair.column(j).dot(&at) + 0.8);
+                let first = a.cos() + b.cos() + (b - a).cos();
+                let second = (a + b).cos() + (2.0 * b - a).cos() + (2.0 * a - b).cos();
+                0.03 * first + second + offsets[i / columns] + 0.2 * normal()
+            };
+            let image = Image::new(rows, columns, (0..rows * columns).map(value).collect());
+            let geometry = Geometry {
+                pixel_to_nm: Matrix2::identity(),
+                origin: Vector2::zeros(),
+                size: [columns, rows],
+                covariance: nalgebra::Matrix4::zeros(),
+                from_sensors: false,
+                departure: None,
+            };
+            let found = measure(&image, &geometry, Background::Plane, Method::Lattice).unwrap();
+            let cells = found.reciprocal.determinant().abs() / pair.determinant().abs();
+            assert!((cells - 1.0).abs() < 0.01, "{seed}: {cells}");
+        }
+    }
 }
