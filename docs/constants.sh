@@ -70,7 +70,6 @@ spectrum/error THIRD set: half double
 high_orders STANDS_OUT set: half double
 high_orders FEWEST set: half double
 coverage/look QUIET edge,island,grains half double
-coverage/look GLANCE edge,island,grains half double
 coverage/look INSIDE edge,island,grains half closer
 coverage/look TYPICAL edge,island,grains half closer
 coverage/look PLAIN edge,island,grains half double

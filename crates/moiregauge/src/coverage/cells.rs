@@ -10,7 +10,7 @@ use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
 use rustfft::num_complex::Complex64;
 
-use crate::coverage::summed::{FEWEST, Nine, Summed, smoothed, together, under};
+use crate::coverage::summed::{FEWEST, Summed, across_lines, smoothed, under};
 use crate::frame::image::Image;
 use crate::numbers::widest::widest;
 
@@ -18,9 +18,6 @@ use crate::numbers::widest::widest;
 const CELLS_PER_PERIOD: f64 = 4.0;
 /// Reach of a window, widths: the rest is a thousandth.
 const REACH: f64 = 3.0;
-
-/// Lines of cells in a band.
-const BAND: usize = 128;
 
 /// The cells of a frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -166,11 +163,12 @@ impl Cells {
                 .collect::<Vec<f64>>()
         });
         let squares = [0, 1].map(|axis| taps[axis].iter().map(|t| t * t).collect::<Vec<f64>>());
-        let weight = smoothed(self.size, &self.count, &taps);
+        let counts = |taps| self.smoothed_counts(taps);
+        let weight = counts(&taps);
         let whole = (self.pixels[0] * self.pixels[1]) as f64
             * taps.iter().map(|t| t.iter().sum::<f64>()).product::<f64>();
         Window {
-            noise: (smoothed(self.size, &self.count, &squares).iter())
+            noise: (counts(&squares).iter())
                 .zip(&weight)
                 .map(|(squares, weight)| squares / (weight * weight))
                 .collect(),
@@ -180,26 +178,45 @@ impl Cells {
         }
     }
 
+    /// Pixels that are there, under taps along columns and rows: a product where all are.
+    fn smoothed_counts(&self, taps: &[Vec<f64>; 2]) -> Vec<f64> {
+        let [across, up] = self.size;
+        let (first, row) = (self.count[0], &self.count[..across]);
+        let column: Vec<f64> = self.count.iter().step_by(across).copied().collect();
+        let is_product = |(line, of): (&[f64], &f64)| {
+            line.iter()
+                .zip(row)
+                .all(|(n, r)| n * first == r * of && *n > 0.0)
+        };
+        if !self.count.chunks_exact(across).zip(&column).all(is_product) {
+            return smoothed(self.size, &self.count, taps);
+        }
+        let under = |values: &[f64], taps: &[f64]| -> Vec<f64> {
+            let at = |i| under(taps, i, values.len(), |j| values[j]);
+            (0..values.len()).map(at).collect()
+        };
+        let (row, column) = (under(row, &taps[0]), under(&column, &taps[1]));
+        (0..across * up)
+            .map(|i| row[i % across] * column[i / across] / first)
+            .collect()
+    }
+
     /// Sums of cells under the window at some of them.
     pub(crate) fn summed_at<T: Summed>(&self, sums: &[T], window: &Window, at: &[usize]) -> Vec<T> {
         let [across, up] = self.size;
-        let mut columns: Vec<usize> = at.iter().map(|i| i % across).collect();
-        columns.sort_unstable();
-        columns.dedup();
-        let mut lines = vec![T::default(); up * columns.len()];
-        let all = sums
-            .par_chunks_exact(across)
-            .zip(lines.par_chunks_exact_mut(columns.len().max(1)))
-            .with_min_len(FEWEST.div_ceil(across));
-        all.for_each(|(line, out)| {
-            for (out, &x) in out.iter_mut().zip(&columns) {
-                *out = under(&window.taps[0], x, across, |i| line[i]);
-            }
-        });
+        let mut rows: Vec<usize> = at.iter().map(|i| i / across).collect();
+        rows.sort_unstable();
+        rows.dedup();
+        let mut lines = vec![T::default(); rows.len() * across];
+        let all = rows.par_iter().zip(lines.par_chunks_exact_mut(across));
+        all.with_min_len(FEWEST.div_ceil(across))
+            .for_each(|(&y, out)| {
+                across_lines(sums, y, up, &window.taps[1], out);
+            });
         let of = |&i: &usize| {
-            let column = columns.partition_point(|x| *x < i % across);
-            let line = |y: usize| lines[y * columns.len() + column];
-            under(&window.taps[1], i / across, up, line)
+            let line = rows.partition_point(|y| *y < i / across);
+            let line = &lines[line * across..][..across];
+            under(&window.taps[0], i % across, across, |x| line[x])
         };
         at.iter().map(of).collect()
     }
@@ -229,65 +246,37 @@ impl Cells {
     }
 
     /// The envelope of a wave: its sums under the window.
-    pub(crate) fn envelope(&self, sums: &[Complex64], window: &Window) -> Vec<Complex64> {
+    pub(crate) fn envelope<T: Summed + Div<f64, Output = T>>(
+        &self,
+        sums: &[T],
+        window: &Window,
+    ) -> Vec<T> {
         let mut envelope = smoothed(self.size, sums, &window.taps);
         let weights = envelope.par_iter_mut().zip(&window.weight);
         weights.with_min_len(FEWEST).for_each(|(sum, weight)| {
             *sum = if *weight > 0.0 {
-                *sum / weight
+                *sum / *weight
             } else {
-                Complex64::default()
+                T::default()
             };
         });
         envelope
     }
 
     /// The same at some cells.
-    pub(crate) fn envelope_at<T: Summed + Div<f64, Output = T>>(
+    pub(crate) fn envelope_at(
         &self,
-        sums: &[T],
+        sums: &[Complex64],
         window: &Window,
         at: &[usize],
-    ) -> Vec<T> {
+    ) -> Vec<Complex64> {
         let summed = self.summed_at(sums, window, at).into_iter().zip(at);
         summed
             .map(|(sum, &i)| match window.weight[i] {
                 weight if weight > 0.0 => sum / weight,
-                _ => T::default(),
+                _ => Complex64::default(),
             })
             .collect()
-    }
-
-    /// The envelopes of nine waves, band by band of lines; `take`: what is kept of a band.
-    pub(crate) fn nine_envelopes<R: Send>(
-        &self,
-        sums: [&[Complex64]; 9],
-        window: &Window,
-        take: impl Fn(&[Nine]) -> R + Sync,
-    ) -> Vec<R> {
-        let [across, up] = self.size;
-        let reach = window.taps[1].len() / 2;
-        let bands = (0..up.div_ceil(BAND)).into_par_iter().map(|band| {
-            let (first, end) = (band * BAND, ((band + 1) * BAND).min(up));
-            // Along the lines of all windows of the band, then across them.
-            let from = first.saturating_sub(reach);
-            let lines: Vec<Nine> = (from..(end + reach).min(up))
-                .flat_map(|y| {
-                    let line = together(sums.map(|sums| &sums[y * across..][..across]));
-                    let smoothed = move |x| under(&window.taps[0], x, across, |i| line[i]);
-                    (0..across).map(smoothed)
-                })
-                .collect();
-            let all = (first * across..end * across).map(|i| match window.weight[i] {
-                weight if weight > 0.0 => {
-                    let line = |y: usize| lines[(y - from) * across + i % across];
-                    under(&window.taps[1], i / across, up, line) / weight
-                }
-                _ => Nine::zeros(),
-            });
-            take(&all.collect::<Vec<Nine>>())
-        });
-        bands.collect()
     }
 
     /// Sums of values under the window at each cell, times powers of their distances from it along columns and rows, cells; `squared`: under the square of

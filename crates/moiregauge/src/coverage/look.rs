@@ -7,7 +7,6 @@ use rustfft::num_complex::Complex64;
 use crate::coverage::cells::{Cells, Window};
 use crate::coverage::hollows::hollows;
 use crate::coverage::patch::LatticeRegion;
-use crate::coverage::summed::{Nine, together};
 use crate::frame::image::Image;
 use crate::numbers::median::median;
 use crate::numbers::three::three;
@@ -15,10 +14,6 @@ use crate::numbers::three::three;
 /// Wide enough: noise in the weighted sum, which is 1 where the lattice is, is below this. Five times it fits between
 /// half and one.
 const QUIET: f64 = 0.1;
-
-/// Multiple of [`QUIET`] that is allowed where only some cells are examined: the typical value is known to a fraction.
-/// Half and twice as much change no result of docs/constants.md.
-const GLANCE: f64 = 2.0;
 
 /// Cells with more than this share of what is typical are the patch: an edge is where the window sees half.
 pub(crate) const INSIDE: f64 = 0.5;
@@ -80,7 +75,7 @@ pub(crate) struct Frame<'a> {
     /// 1 where a pixel is there; `None` where all are.
     ones: Option<Image>,
     /// Sums of the pixels of each cell.
-    level: Vec<Complex64>,
+    level: Vec<f64>,
 }
 
 /// Sums over cells for a pair of waves.
@@ -92,56 +87,13 @@ pub(crate) struct Waves {
     quiet: [[Vec<Complex64>; 2]; 3],
 }
 
-/// The sums of three waves and what is beside each.
-fn nine<'a>(
-    [a, b, c]: &'a [Vec<Complex64>; 3],
-    [beside_a, beside_b, beside_c]: &'a [[Vec<Complex64>; 2]; 3],
-) -> [&'a [Complex64]; 9] {
-    let ([d, e], [f, g], [h, i]) = (beside_a, beside_b, beside_c);
-    [a, b, c, d, e, f, g, h, i].map(Vec::as_slice)
-}
-
-/// What is kept of the envelopes of some lines: those of three waves, and the powers beside them.
-struct Band {
-    waves: [Vec<Complex64>; 3],
-    beside: [Vec<f64>; 6],
-}
-
-impl Band {
-    fn of(envelopes: &[Nine]) -> Self {
-        let of = |n: usize| envelopes.iter().map(move |all| part(all, n));
-        Self {
-            waves: [0, 1, 2].map(|n| of(n).collect()),
-            beside: [3, 4, 5, 6, 7, 8].map(|n| of(n).map(|value| value.norm_sqr()).collect()),
-        }
-    }
-}
-
-/// One list of all bands.
-fn joined<T: Copy>(bands: &[Band], list: impl Fn(&Band) -> &Vec<T>) -> Vec<T> {
-    bands
-        .iter()
-        .flat_map(|band| list(band).iter().copied())
-        .collect()
-}
-
-/// One of nine.
-fn part(all: &Nine, n: usize) -> Complex64 {
-    Complex64::new(all[2 * n], all[2 * n + 1])
-}
-
 impl Waves {
-    /// The sums, and those of what is beside: all of a cell together.
-    pub(crate) fn together(&self) -> Vec<Nine> {
-        together(nine(&self.sums, &self.quiet))
-    }
-
-    /// The same for the image without a level of each cell.
-    pub(crate) fn without(&self, level: &[Complex64]) -> [Vec<Complex64>; 3] {
+    /// The sums for the image without a level of each cell.
+    pub(crate) fn without(&self, level: &[f64]) -> [Vec<Complex64>; 3] {
         [0, 1, 2].map(|i| {
             let of_cells = self.sums[i].iter().zip(&self.ones[i]).zip(level);
             of_cells
-                .map(|((sum, ones), level)| sum - level * ones)
+                .map(|((sum, ones), level)| sum - ones * level)
                 .collect()
         })
     }
@@ -149,11 +101,12 @@ impl Waves {
 
 impl<'a> Frame<'a> {
     pub(crate) fn new(cells: &'a Cells, image: &'a Image) -> Self {
+        let levels = cells.mixed(image, Vector2::zeros());
         Self {
             cells,
             image,
             ones: ones(image),
-            level: cells.mixed(image, Vector2::zeros()),
+            level: levels.iter().map(|level| level.re).collect(),
         }
     }
 
@@ -170,34 +123,59 @@ impl<'a> Frame<'a> {
     }
 
     /// The mean under the window at each cell. A window that the frame or missing pixels cut off sees a wave in every constant.
-    pub(crate) fn level(&self, window: &Window) -> Vec<Complex64> {
+    pub(crate) fn level(&self, window: &Window) -> Vec<f64> {
         self.cells.envelope(&self.level, window)
+    }
+
+    /// Cells a number of mean periods apart, by default all, of which the window is there for the most part.
+    fn usable(&self, window: &Window, apart: f64) -> Vec<usize> {
+        let cells = self.cells;
+        let stride = [0, 1].map(|axis| {
+            let cells = apart * cells.period[axis] / cells.pixels[axis] as f64;
+            (cells as usize).max(1)
+        });
+        let every = |axis: usize| (stride[axis] / 2..cells.size[axis]).step_by(stride[axis]);
+        let all = every(1).flat_map(|y| every(0).map(move |x| y * cells.size[0] + x));
+        all.filter(|&i| window.support[i] > SUPPORT).collect()
+    }
+
+    /// Noise power per pixel at each wave: what is beside it, seen by windows at some cells, as the median sees it. Edges and steps, which are in
+    /// few windows, do not count.
+    fn noise(&self, waves: &Waves, window: &Window, at: &[usize]) -> [f64; 3] {
+        let level = |sums: &Vec<Complex64>| {
+            let envelopes = self.cells.envelope_at(sums, window, at);
+            let powers = envelopes.iter().zip(at);
+            let powers = powers.map(|(envelope, &i)| envelope.norm_sqr() / window.noise[i]);
+            median(&mut powers.collect::<Vec<f64>>()) / std::f64::consts::LN_2
+        };
+        let all: Vec<f64> = (waves.quiet.par_iter().flatten().map(level)).collect();
+        [0, 2, 4].map(|i| f64::midpoint(all[i], all[i + 1]))
     }
 
     /// Amplitudes under a window of a number of mean periods; `None` where noise makes it unfit.
     pub(crate) fn look(&self, waves: &Waves, window: &Window, width: f64) -> Option<Seen> {
         let cells = self.cells;
-        let sums = waves.without(&self.level(window));
-        let bands = cells.nine_envelopes(nine(&sums, &waves.quiet), window, Band::of);
-        let envelopes = [0, 1, 2].map(|n| joined(&bands, |band| &band.waves[n]));
-        let usable: Vec<usize> = (0..cells.len())
-            .filter(|&i| window.support[i] > SUPPORT)
-            .collect();
-        if usable.is_empty() {
+        let variance =
+            |at: &[usize]| median(&mut at.iter().map(|&i| window.noise[i]).collect::<Vec<_>>());
+        // Windows a width apart tell noise as well as all do, for a fraction of the work.
+        let apart = self.usable(window, width);
+        if apart.is_empty() {
             return None;
         }
-        let of_noise: Vec<f64> = usable.iter().map(|&i| window.noise[i]).collect();
-        let quiet = (0..6).into_par_iter().map(|n| {
-            let powers = joined(&bands, |band| &band.beside[n]);
-            level(usable.iter().map(|&i| powers[i]), &of_noise)
+        let noise = self.noise(waves, window, &apart);
+        let unit = noise.map(|noise| noise * variance(&apart));
+        let sums = waves.without(&self.level(window));
+        let powers = sums.each_ref().map(|sums| {
+            let envelopes = cells.envelope_at(sums, window, &apart);
+            envelopes.iter().map(Complex64::norm_sqr).collect()
         });
-        let quiet: Vec<f64> = quiet.collect();
-        let noise = [0, 2, 4].map(|i| f64::midpoint(quiet[i], quiet[i + 1]));
-        let one = median(&mut of_noise.clone());
-        let unit = noise.map(|noise| noise * one);
+        typical(&powers, unit)?;
+        let envelopes = sums.map(|sums| cells.envelope(&sums, window));
+        let usable = self.usable(window, 0.0);
+        let unit = noise.map(|noise| noise * variance(&usable));
         let powers =
             [0, 1, 2].map(|i| usable.iter().map(|&n| envelopes[i][n].norm_sqr()).collect());
-        let (typical, there) = typical(&powers, unit, QUIET)?;
+        let (typical, there) = typical(&powers, unit)?;
         let mut inside = vec![false; cells.len()];
         for (&i, there) in usable.iter().zip(there) {
             inside[i] = there;
@@ -210,37 +188,6 @@ impl<'a> Frame<'a> {
             noise,
             width,
         })
-    }
-
-    /// Whether a look may find anything: the same at cells a window apart, which is a fraction of the work where cells are many.
-    /// Waves that noise proposes are refused by it.
-    pub(crate) fn shows(&self, together: &[Nine], window: &Window, width: f64) -> bool {
-        let cells = self.cells;
-        let stride = [0, 1].map(|axis| {
-            let cells = width * cells.period[axis] / cells.pixels[axis] as f64;
-            (cells as usize).max(1)
-        });
-        if stride[0] * stride[1] == 1 {
-            return true;
-        }
-        let every = |axis: usize| (stride[axis] / 2..cells.size[axis]).step_by(stride[axis]);
-        let usable: Vec<usize> = every(1)
-            .flat_map(|y| every(0).map(move |x| y * cells.size[0] + x))
-            .filter(|&i| window.support[i] > SUPPORT)
-            .collect();
-        if usable.is_empty() {
-            return true;
-        }
-        let of_noise: Vec<f64> = usable.iter().map(|&i| window.noise[i]).collect();
-        let envelopes = cells.envelope_at(together, window, &usable);
-        let power = |n: usize| envelopes.iter().map(move |all| part(all, n).norm_sqr());
-        let one = median(&mut of_noise.clone());
-        let unit = [0, 1, 2].map(|i| {
-            let quiet = [3 + 2 * i, 4 + 2 * i];
-            let [a, b] = quiet.map(|n| level(power(n), &of_noise));
-            f64::midpoint(a, b) * one
-        });
-        typical(&[0, 1, 2].map(|n| power(n).collect()), unit, GLANCE * QUIET).is_some()
     }
 }
 
@@ -256,15 +203,9 @@ pub(crate) fn ones(image: &Image) -> Option<Image> {
     Some(Image::new(image.rows, image.columns, ones.collect()))
 }
 
-/// Noise power per pixel, as the median sees it: edges and steps, which are in few cells, do not count.
-fn level(powers: impl Iterator<Item = f64>, noise: &[f64]) -> f64 {
-    let powers = powers.zip(noise).map(|(power, noise)| power / noise);
-    median(&mut powers.collect::<Vec<f64>>()) / std::f64::consts::LN_2
-}
-
 /// Typical power of each wave where it is, and where that is, by the powers at some cells: first by the strong cells, then as the
-/// median of the patch. `None` where noise, of power `unit` in a cell, is more than `most` of it.
-fn typical(powers: &[Vec<f64>; 3], unit: [f64; 3], most: f64) -> Option<([f64; 3], Vec<bool>)> {
+/// median of the patch. `None` where noise, of power `unit` in a cell, is more than [`QUIET`] of it.
+fn typical(powers: &[Vec<f64>; 3], unit: [f64; 3]) -> Option<([f64; 3], Vec<bool>)> {
     let mut typical = powers.each_ref().map(|powers| {
         powers.iter().map(|p| p * p).sum::<f64>()
             / powers.iter().sum::<f64>().max(f64::MIN_POSITIVE)
@@ -273,7 +214,7 @@ fn typical(powers: &[Vec<f64>; 3], unit: [f64; 3], most: f64) -> Option<([f64; 3
     for _ in 0..4 {
         let total: f64 = typical.iter().sum();
         let noisy: f64 = (0..3).map(|i| typical[i] * unit[i]).sum();
-        if !((noisy / 2.0).sqrt() / total < most) {
+        if !((noisy / 2.0).sqrt() / total < QUIET) {
             return None;
         }
         for (n, inside) in inside.iter_mut().enumerate() {

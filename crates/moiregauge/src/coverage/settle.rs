@@ -105,15 +105,8 @@ fn settle_bins(
     let mut narrowest = 0;
     let mut settled = None;
     let mut before = f64::INFINITY;
-    for round in 0..MOST_ROUNDS {
+    for _ in 0..MOST_ROUNDS {
         let waves = frame.waves(&pair);
-        if round == 0 {
-            let together = waves.together();
-            let mut all = WIDTHS.into_iter().enumerate();
-            if !all.any(|(i, width)| frame.shows(&together, windows.at(i), width)) {
-                return None;
-            }
-        }
         let seen = (narrowest..WIDTHS.len())
             .find_map(|i| Some((i, frame.look(&waves, windows.at(i), WIDTHS[i])?)));
         let (width, seen) = seen?;

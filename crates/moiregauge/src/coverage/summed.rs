@@ -2,9 +2,7 @@
 
 use std::ops::{AddAssign, Mul};
 
-use nalgebra::SVector;
 use rayon::prelude::*;
-use rustfft::num_complex::Complex64;
 
 use crate::numbers::widest::widest;
 
@@ -18,20 +16,6 @@ pub(crate) trait Summed:
 }
 
 impl<T: Copy + Default + Send + Sync + AddAssign + Mul<f64, Output = T>> Summed for T {}
-
-/// Nine complex numbers.
-pub(crate) type Nine = SVector<f64, 18>;
-
-/// What is in nine lists, all of one place together.
-pub(crate) fn together(lists: [&[Complex64]; 9]) -> Vec<Nine> {
-    let mut together = vec![Nine::zeros(); lists[0].len()];
-    for (n, list) in lists.into_iter().enumerate() {
-        for (all, value) in together.iter_mut().zip(list) {
-            (all[2 * n], all[2 * n + 1]) = (value.re, value.im);
-        }
-    }
-    together
-}
 
 /// Adds values times a tap.
 fn add<T: Summed>(sums: &mut [T], values: &[T], tap: f64) {
@@ -67,40 +51,45 @@ pub(crate) fn under<T: Summed>(
     )
 }
 
-/// Convolution of the values of `[across, up]` cells with the taps along columns, then along rows.
+/// The sum of some lines of cells, of which there are `up`, under a window at one of them.
+pub(crate) fn across_lines<T: Summed>(
+    values: &[T],
+    at: usize,
+    up: usize,
+    taps: &[f64],
+    sum: &mut [T],
+) {
+    let reach = taps.len() / 2;
+    for other in at.saturating_sub(reach)..=(at + reach).min(up - 1) {
+        let line = &values[other * sum.len()..][..sum.len()];
+        add(sum, line, taps[other + reach - at]);
+    }
+}
+
+/// Convolution of the values of `[across, up]` cells with the taps along rows, then along columns.
 pub(crate) fn smoothed<T: Summed>(
     [across, up]: [usize; 2],
     values: &[T],
     taps: &[Vec<f64>; 2],
 ) -> Vec<T> {
-    let at_once = FEWEST.div_ceil(across);
-    let mut lines = vec![T::default(); values.len()];
     let reach = taps[0].len() / 2;
-    let all = values
-        .par_chunks_exact(across)
-        .zip(lines.par_chunks_exact_mut(across))
-        .with_min_len(at_once);
-    all.for_each(|(line, out)| {
-        for (i, tap) in taps[0].iter().enumerate() {
-            // Values at x + i − reach.
-            let (before, after) = (reach.saturating_sub(i), i.saturating_sub(reach));
-            if before.max(after) < across {
-                add(
-                    &mut out[before..across - after],
-                    &line[after..across - before],
-                    *tap,
-                );
-            }
-        }
-    });
     let mut out = vec![T::default(); values.len()];
-    let reach = taps[1].len() / 2;
-    let targets = out.par_chunks_exact_mut(across).with_min_len(at_once);
-    targets.enumerate().for_each(|(y, target)| {
-        for other in y.saturating_sub(reach)..=(y + reach).min(up - 1) {
-            let line = &lines[other * across..][..across];
-            add(target, line, taps[1][other + reach - y]);
-        }
-    });
+    let all = out.par_chunks_exact_mut(across).enumerate();
+    let all = all.with_min_len(FEWEST.div_ceil(across));
+    all.for_each_init(
+        || vec![T::default(); across],
+        |line, (y, out)| {
+            line.fill(T::default());
+            across_lines(values, y, up, &taps[1], line);
+            for (i, tap) in taps[0].iter().enumerate() {
+                // Values at x + i − reach.
+                let (before, after) = (reach.saturating_sub(i), i.saturating_sub(reach));
+                if before.max(after) < across {
+                    let target = &mut out[before..across - after];
+                    add(target, &line[after..across - before], *tap);
+                }
+            }
+        },
+    );
     out
 }

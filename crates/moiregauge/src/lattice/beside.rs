@@ -85,6 +85,7 @@ mod tests {
 
     const SIZE: usize = 128;
     const SEEDS: u64 = 12;
+    const STRIPED: u64 = 20;
 
     /// Eight to ten periods of a lattice.
     fn pair() -> Matrix2<f64> {
@@ -109,12 +110,12 @@ mod tests {
         Geometry::of_pitch([SIZE, SIZE], [0.25, 0.25], 0.0, Vector2::zeros()).unwrap()
     }
 
-    /// A wave one and a half times as strong as those of a lattice and two cycles of the frame from one of them, with an overtone: the lattice is found,
-    /// and its waves are off by no more than the errors say. Twelve images are 48 numbers, whose rms scatters by 10 %.
+    /// A wave one and a half times as strong as those of a lattice and two cycles of the frame from one of them, with an overtone: what is found is the
+    /// lattice, in four images of five, and its waves are off by no more than the errors say. Sixteen images are 64 numbers, whose rms scatters by 9 %.
     #[test]
     fn stripes_close_to_a_lattice_are_told_from_it() {
-        let mut sum = 0.0;
-        for seed in 0..SEEDS {
+        let (mut sum, mut answered) = (0.0, 0);
+        for seed in 0..STRIPED {
             let turn = seed as f64 * 0.5;
             let away = Vector2::new(turn.cos(), turn.sin()) * (2.0 * TAU / SIZE as f64);
             let q = three(&pair())[seed as usize % 3] + away;
@@ -124,15 +125,19 @@ mod tests {
             };
             let striped = image(seed, |at| lattice(at) + stripes(at));
             let found = measure(&striped, &geometry(), Background::Plane, Method::Lattice);
-            let fit = found.unwrap().fit.unwrap();
+            let Some(fit) = found.ok().and_then(|found| found.fit) else {
+                continue;
+            };
             let names = pair().try_inverse().unwrap() * fit.wave_vectors.basis;
             let whole = names.map(f64::round);
             assert_eq!(whole.determinant().abs(), 1.0, "{seed}: {names}");
             let error = fit.wave_vectors.basis - pair() * whole;
             sum += error.norm_squared() / fit.wave_vectors.covariance.trace();
+            answered += 1;
         }
-        let pull = (sum / SEEDS as f64).sqrt();
-        assert!((0.5..1.5).contains(&pull), "{pull}");
+        let pull = (sum / f64::from(answered)).sqrt();
+        assert!((0.75..1.25).contains(&pull), "{pull}");
+        assert!(answered >= STRIPED as i32 * 3 / 4, "{answered}");
     }
 
     /// Nothing is taken off a lattice that is alone, covers a part of the frame, or changes across it.
