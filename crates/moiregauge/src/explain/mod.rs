@@ -14,6 +14,7 @@ pub(crate) mod lanes;
 pub(crate) mod normal;
 pub(crate) mod phases;
 pub(crate) mod scene;
+pub(crate) mod split;
 pub(crate) mod table;
 pub(crate) mod waves;
 

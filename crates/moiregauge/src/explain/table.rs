@@ -1,12 +1,18 @@
 //! The lattices that an image may show, in one table, by what each predicts.
 
+use std::f64::consts::TAU;
+
 use nalgebra::{Matrix2, Vector2};
 
-use crate::explain::evidence::Blocks;
+use crate::explain::evidence::{BETTER, Blocks};
 use crate::explain::normal::gains;
 use crate::explain::phases::{CUBIC, Phases};
 use crate::explain::scene::Scene;
+use crate::explain::split::{Guess, split};
 use crate::frame::image::Image;
+use crate::numbers::three::three;
+use crate::spectrum::rivals::LOBE;
+use crate::spectrum::select::TOLERANCE;
 use crate::spectrum::shells::shells;
 
 /// What predicts less than this share of the variance is not listed.
@@ -101,6 +107,11 @@ pub(crate) fn table(
             rows.push(row(pair, &gains(&normals(&phases), &all)?, 1));
         }
     }
+    if let Some(both) = two_close(&scene, &(first * binning)) {
+        let waves: Vec<usize> = (0..2 * (indices.len() + both.others.len())).collect();
+        let row = row(both.pair / binning, &gains(&normals(&both), &waves)?, 1);
+        rows.extend((row.behind < -BETTER).then_some(row));
+    }
     rows.retain(|row| row.share > LISTED);
     rows.sort_by(|a, b| a.behind.total_cmp(&b.behind));
     let answer = Row {
@@ -109,6 +120,28 @@ pub(crate) fn table(
     };
     rows.insert(0, answer);
     Some(rows)
+}
+
+/// Two straight lattices on top of each other that look like one (reciprocal pair at 60°, rad per bin), since their waves beat: the stronger one, and the
+/// three first waves of the other. `None` where what is beside its waves is no lattice of its own.
+fn two_close(scene: &Scene, first: &Matrix2<f64>) -> Option<Phases> {
+    let rows = scene.values.len() / scene.columns;
+    let image = Image::new(rows, scene.columns, scene.values.clone());
+    let mut guesses = split(&image, first)?;
+    let power = |guess: &Guess| (guess.waves.iter().map(|w| w.amplitude.norm_sqr())).sum::<f64>();
+    guesses.sort_by(|a, b| power(b).total_cmp(&power(a)));
+    let [stronger, other] = guesses.map(|guess| guess.pair);
+    let mut both = Phases::straight(stronger);
+    both.others = three(&other).to_vec();
+    let both = both.fitted(scene, shells(2), 0)?;
+    let cycles = |q: Vector2<f64>| (q.component_mul(&scene.half) * 2.0 / TAU).norm();
+    let apart = three(&both.pair).into_iter().zip(&both.others);
+    let mut apart = apart.map(|(own, other)| cycles(other - own));
+    let [a, b, c] = both.others[..] else {
+        return None;
+    };
+    let beat = apart.all(|apart| (TOLERANCE..LOBE).contains(&apart));
+    (beat && cycles(b - a - c) < TOLERANCE).then_some(both)
 }
 
 /// Whether all points of one lattice are those of the other.

@@ -376,6 +376,36 @@ fn the_table_ranks_two_moires_by_what_they_predict() {
     }
 }
 
+/// Two lattices whose waves beat, less than a cycle of the frame apart, look like one between them, that bends: both together predict more, in closed form,
+/// and the stronger one is told. A lattice that bends or fades is no two.
+#[test]
+fn the_table_knows_two_lattices_that_beat() {
+    let (sin, cos) = 0.02_f64.sin_cos();
+    let other = 1.06 * Matrix2::new(cos, -sin, sin, cos) * pair();
+    let between = pair() + (other - pair()) / 3.0;
+    let middle = Vector2::new(SIZE[0] as f64, SIZE[1] as f64) / 2.0;
+    for seed in 0..3 {
+        let value = |at: Vector2<f64>| lattice(&pair(), at) + 0.5 * lattice(&other, at);
+        let rows = table(&image(seed, 0.3, value), &between, &[], true).unwrap();
+        assert_eq!(rows.len(), 2);
+        let share = 1.5 * 1.25 / (1.5 * 1.25 + 0.09);
+        assert!((rows[1].share - share).abs() < 0.02, "{}", rows[1].share);
+        assert!(rows[1].behind < -BETTER && (rows[1].pair - pair()).amax() < 0.003);
+        let alone = |value: &dyn Fn(Vector2<f64>) -> f64| {
+            let image = image(seed, 0.3, value);
+            table(&image, &pair(), &[], true).unwrap().len()
+        };
+        let bent = |at: Vector2<f64>| {
+            let unit = (at - middle).component_div(&middle);
+            at + 2.0 * Vector2::new(unit.y * unit.y, unit.x * unit.y)
+        };
+        let fade = |at: Vector2<f64>| 1.0 + 0.7 * (at.x / middle.x - 1.0);
+        assert_eq!(alone(&|at| lattice(&pair(), at)), 1);
+        assert_eq!(alone(&|at| lattice(&pair(), bent(at))), 1);
+        assert_eq!(alone(&|at| fade(at) * lattice(&pair(), at)), 1);
+    }
+}
+
 /// A superlattice lists the lattice of a third of its cell with what the harmonics of that predict.
 #[test]
 fn the_table_knows_the_parts_of_a_cell() {

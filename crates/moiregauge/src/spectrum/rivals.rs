@@ -22,7 +22,7 @@ const OWN: f64 = 0.25;
 /// Shells of which one has to stand out: a cell of many atoms scatters into the third to fifth.
 const SHELLS: usize = 5;
 /// Half of the main lobe of the window, cycles per frame: what lies nearer to a point is its peak, and what lies nearer to kx = 0 is noise of whole lines.
-const LOBE: f64 = 1.6;
+pub(crate) const LOBE: f64 = 1.6;
 
 /// The peaks of a spectrum, however small.
 pub(crate) struct Rivals<'a> {

@@ -17,7 +17,6 @@
 
 pub(crate) mod atoms;
 pub(crate) mod entangled;
-pub(crate) mod split;
 pub(crate) mod together;
 
 pub use together::measure_several;

@@ -2,14 +2,15 @@
 
 use nalgebra::{Matrix2, Vector2};
 
+use crate::explain::split::{Guess, split};
 use crate::frame::background::{Background, remove_background};
 use crate::frame::departure::Departure;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
+use crate::lattice::fit::waves::sum;
 use crate::lattice::measure::measure_whole;
 use crate::lattice::measured::MeasuredLattice;
 use crate::lattice::several::entangled::{Part, beside_each_other};
-use crate::lattice::several::split;
 use crate::lattice::start::Start;
 use crate::numbers::MOST_ROUNDS;
 use crate::spectrum::error::LatticeError;
@@ -171,7 +172,7 @@ impl Scene<'_> {
                 take_off(&mut left, &parts[i].model);
             }
             let flat = remove_background(&left, self.background);
-            let Some([a, b]) = split::split(&flat, &pair) else {
+            let Some([a, b]) = split(&flat, &pair) else {
                 continue;
             };
             let near = |model: &[f64], pair: &Matrix2<f64>| {
@@ -179,7 +180,7 @@ impl Scene<'_> {
                 take_off(&mut rest, model);
                 self.part(self.near(&rest, pair)?)
             };
-            let Some(first) = near(&b.model, &a.pair) else {
+            let Some(first) = near(&model(&flat, &b), &a.pair) else {
                 continue;
             };
             let Some(second) = near(&first.model, &b.pair) else {
@@ -246,6 +247,16 @@ impl Scene<'_> {
         }
         Err(LatticeError::Entangled)
     }
+}
+
+/// What the first waves of a lattice make of an image.
+fn model(image: &Image, guess: &Guess) -> Vec<f64> {
+    let centre = Vector2::new(image.columns as f64 - 1.0, image.rows as f64 - 1.0) / 2.0;
+    let waves = guess
+        .waves
+        .iter()
+        .map(|wave| (wave.q, 2.0 * wave.amplitude));
+    sum(image, waves, centre, None)
 }
 
 pub(crate) fn take_off(image: &mut Image, model: &[f64]) {

@@ -11,7 +11,6 @@ use nalgebra::{Matrix2, Vector2};
 use rustfft::num_complex::Complex64;
 
 use crate::frame::image::Image;
-use crate::lattice::fit::waves::sum;
 use crate::spectrum::select::TOLERANCE;
 
 /// Step of the grid, cycles per frame: a small part of a main lobe, ...
@@ -19,17 +18,17 @@ const STEP: f64 = 0.25;
 /// ... and its reach in steps: 2.5 cycles, a main lobe and a half.
 const REACH: i32 = 10;
 
-/// A lattice to start with: its reciprocal pair (rad per pixel) and what it makes of the image.
+/// A lattice to start with: its reciprocal pair (rad per pixel) and its three first waves.
 pub(crate) struct Guess {
     pub(crate) pair: Matrix2<f64>,
-    pub(crate) model: Vec<f64>,
+    pub(crate) waves: [Wave; 3],
 }
 
 /// One wave: q (rad per pixel) and amplitude, `2 Re c e^{iq·n}` about the middle.
 #[derive(Clone, Copy)]
-struct Wave {
-    q: Vector2<f64>,
-    amplitude: Complex64,
+pub(crate) struct Wave {
+    pub(crate) q: Vector2<f64>,
+    pub(crate) amplitude: Complex64,
 }
 
 /// The two lattices near `pair`; `None` where only one is seen.
@@ -52,7 +51,7 @@ pub(crate) fn split(image: &Image, pair: &Matrix2<f64>) -> Option<[Guess; 2]> {
         let [a, b, c] = waves.map(|w| w.q);
         Guess {
             pair: Matrix2::from_columns(&[(2.0 * a + b - c) / 3.0, (a + 2.0 * b + c) / 3.0]),
-            model: model(image, &waves),
+            waves,
         }
     };
     Some([
@@ -140,12 +139,6 @@ fn sinc(x: f64) -> f64 {
     } else {
         angle.sin() / angle
     }
-}
-
-fn model(image: &Image, waves: &[Wave]) -> Vec<f64> {
-    let centre = Vector2::new(image.columns as f64 - 1.0, image.rows as f64 - 1.0) / 2.0;
-    let waves = waves.iter().map(|wave| (wave.q, 2.0 * wave.amplitude));
-    sum(image, waves, centre, None)
 }
 
 #[cfg(test)]
