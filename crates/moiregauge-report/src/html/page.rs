@@ -374,16 +374,23 @@ fn drift(drift: &DriftResult) -> Drift {
 
 fn candidates(line: &LineResult) -> impl Iterator<Item = [String; 5]> {
     line.candidates.iter().enumerate().map(|(i, candidate)| {
-        let [a, b, c] = candidate.wavelengths_nm.map(|length| plain(length, 2));
+        let lengths = |all: [Option<f64>; 3]| all.map(|length| plain(length, 2)).join(", ");
+        let own = lengths(candidate.wavelengths_nm);
+        let second = candidate.second_wavelengths_nm.map(lengths);
         let what = match (i, candidate.cells) {
             (0, _) => "measured".to_owned(),
+            _ if second.is_some() => "two on top of each other".to_owned(),
             (_, 1) => "another".to_owned(),
             (_, cells) => format!("1/{cells} of its cell"),
         };
         let share = candidate.predicted_share.map(|share| 100.0 * share);
         [
             line.line.clone(),
-            format!("{a}, {b}, {c}"),
+            [own]
+                .into_iter()
+                .chain(second)
+                .collect::<Vec<_>>()
+                .join(" and "),
             what,
             plain(share, 1),
             plain(candidate.behind_by.filter(|_| i > 0), 1),

@@ -88,6 +88,9 @@ pub struct ScanTwistStrain {
 pub struct CandidateResult {
     /// Lengths of its three shortest vectors by the geometry of the scan, drift included, shortest first.
     pub wavelengths_nm: [Option<f64>; 3],
+    /// The same of a second lattice on top of it, where the two are described together: share and comparison are those of both.
+    #[serde(default)]
+    pub second_wavelengths_nm: Option<[Option<f64>; 3]>,
     /// How many of its cells the lattice that was measured has in one: 3 or 4 for a lattice that is made of harmonics of that.
     pub cells: usize,
     /// Share of the variance of parts of the frame that were held out, without slow background, that it predicts.
@@ -111,6 +114,9 @@ pub struct LineResult {
     pub predicted_by: Option<f64>,
     /// How many waves of about the same period beside the lattice are as strong as its weakest one; three could make another lattice.
     pub rivals: Option<usize>,
+    /// Of a second lattice on top of it, which was measured with it: lengths of its three shortest vectors as those of `candidates`, which are of the image without it.
+    #[serde(default)]
+    pub second_wavelengths_nm: Option<[Option<f64>; 3]>,
     /// The lattices that were compared: the one that was measured, then the others, those that predict most first.
     pub candidates: Vec<CandidateResult>,
     /// Share of the frame that carries the lattice and was measured.
@@ -184,6 +190,7 @@ fn vector(scan: &ScanAnalysis, index: usize, bilayer: Bilayer<'_>) -> ScanVector
 fn candidate(candidate: &Candidate) -> CandidateResult {
     CandidateResult {
         wavelengths_nm: candidate.wavelengths.map(number),
+        second_wavelengths_nm: candidate.second.map(|lengths| lengths.map(number)),
         cells: candidate.cells,
         predicted_share: number(candidate.share),
         behind_by: number(candidate.behind),
@@ -203,6 +210,9 @@ fn line_result(line: &LineAnalysis, bilayer: Bilayer<'_>) -> LineResult {
         signal_to_noise: number(line.signal_to_noise),
         predicted_by: evidence.and_then(|e| e.predicts).and_then(number),
         rivals: evidence.map(|e| e.rivals),
+        second_wavelengths_nm: evidence
+            .and_then(|evidence| evidence.second)
+            .map(|lengths| lengths.map(number)),
         candidates: evidence
             .map_or_else(Vec::new, |e| e.candidates.iter().map(candidate).collect()),
         share_covered: number(line.patch.as_ref().map_or(1.0, |patch| patch.share)),

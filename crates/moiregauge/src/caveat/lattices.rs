@@ -116,10 +116,8 @@ pub enum LatticeDoubt {
     },
     /// Another lattice predicts the image about as well.
     #[error(
-        "the image does not decide between two lattices. Look at its Fourier transform, and give the approximate \
-         wavelength of the right one. The other lattice ({}) predicts {:.0} % of the image where this one predicts \
-         {:.0} %, which is {} by {:.1} standard errors",
-        nanometres(&.other.wavelengths), 100.0 * .other.share, 100.0 * .whole.share, if .other.behind < 0.0 { "better" } else { "worse" }, .other.behind.abs()
+        "{} {:.0} % of the image where this one predicts {:.0} %, which is {} by {:.1} standard errors",
+        other_lattice(.other), 100.0 * .other.share, 100.0 * .whole.share, if .other.behind < 0.0 { "better" } else { "worse" }, .other.behind.abs()
     )]
     OtherLattice {
         /// The lattice that was measured.
@@ -140,6 +138,16 @@ pub enum LatticeDoubt {
         whole: Candidate,
         /// That of a part of its cell.
         part: Candidate,
+    },
+    /// A second lattice was measured with it.
+    #[error(
+        "the image shows a second lattice ({}) on top of the one that was measured, and the two were measured \
+         together. Ask for two moirés to get the results of both",
+        nanometres(.second)
+    )]
+    TwoLattices {
+        /// Wavelengths of the second lattice, nm.
+        second: [f64; 3],
     },
     /// There is another wave.
     #[error(
@@ -195,6 +203,26 @@ fn listed(all: &[OtherGrain]) -> String {
         )
     };
     all.iter().map(of).collect::<Vec<_>>().join("; ")
+}
+
+/// What another lattice means for the result and what to do, up to the figures.
+fn other_lattice(other: &Candidate) -> String {
+    let own = nanometres(&other.wavelengths);
+    other.second.map_or_else(
+        || {
+            format!(
+                "the image does not decide between two lattices. Look at its Fourier transform, and give the \
+                 approximate wavelength of the right one. The other lattice ({own}) predicts"
+            )
+        },
+        |second| {
+            format!(
+                "the lattice may lie between two that the image shows on top of each other. Measure two moirés. Both \
+                 together ({own} and {}) predict",
+                nanometres(&second)
+            )
+        },
+    )
 }
 
 /// Three lengths, nm.
@@ -293,7 +321,7 @@ explain! { LatticeDoubt:
         "Map the lattice, or analyse a smaller part of the frame."
     OtherLattice "other-lattice" Serious
         "Another lattice predicts the image about as well, within four standard errors, or better with waves that may belong to something else. The image does not decide which one it shows: a second moiré, holes or a rough \
-         background may have made either."
+         background may have made either. Or two lattices on top of each other predict it better, and the one that was measured lies between them."
         "Look at the Fourier transform of the image. Give the approximate wavelength of the right lattice, or measure two moirés."
     PartOfCell "part-of-cell" Serious
         "Most of the image is predicted by a lattice of a third or a fourth of the cell, and the other harmonics do not agree with it: they may be a second \
@@ -303,6 +331,10 @@ explain! { LatticeDoubt:
         "One or two waves of about the period of the lattice, and none of its own, are as strong as its weakest one: stripes, or a second moiré. With three the \
          image would be refused, since these could be a lattice as well."
         "Look at the Fourier transform of the image. Give the approximate wavelength of the right lattice, or measure two moirés."
+    TwoLattices "two-lattices" Note
+        "The image shows a second lattice on top of the one that makes most of it. Both were measured together, which \
+         predicts the image better than one alone, and the results are those of the stronger one."
+        "Ask for two moirés to get the results of both."
     SecondLattice "second-lattice" Note
         "The image shows a wave, well above the noise, that does not belong to the lattice. It may come from a second \
          moiré or from interference."

@@ -127,7 +127,7 @@ impl<'a> Frame<'a> {
         self.cells.envelope(&self.level, window)
     }
 
-    /// Cells a number of mean periods apart, by default all, of which the window is there for the most part.
+    /// Cells a number of mean periods `apart` (0: all) whose window is there for the most part.
     fn usable(&self, window: &Window, apart: f64) -> Vec<usize> {
         let cells = self.cells;
         let stride = [0, 1].map(|axis| {

@@ -29,6 +29,8 @@ const LIKE: f64 = 2.0;
 pub(crate) struct Row {
     /// Reciprocal pair at 60°, rad per pixel.
     pub(crate) pair: Matrix2<f64>,
+    /// A second lattice on top of it that is described with it: share and comparison are those of both.
+    pub(crate) second: Option<Matrix2<f64>>,
     /// Share of the variance of held-out blocks (without slow background) that it predicts.
     pub(crate) share: f64,
     /// By how many standard errors over blocks the first lattice of the table predicts better.
@@ -74,6 +76,7 @@ pub(crate) fn table(
     let most = gains(&answer, &all)?;
     let row = |pair: Matrix2<f64>, own: &[f64], cells: usize| Row {
         pair,
+        second: None,
         share: own.iter().sum::<f64>() / power,
         behind: Blocks::difference(&scene, &most, own).standard_errors(),
         cells,
@@ -109,7 +112,11 @@ pub(crate) fn table(
     }
     if let Some(both) = two_close(&scene, &(first * binning)) {
         let waves: Vec<usize> = (0..2 * (indices.len() + both.others.len())).collect();
-        let row = row(both.pair / binning, &gains(&normals(&both), &waves)?, 1);
+        let second = Matrix2::from_columns(&both.others[..2]) / binning;
+        let row = Row {
+            second: Some(second),
+            ..row(both.pair / binning, &gains(&normals(&both), &waves)?, 1)
+        };
         rows.extend((row.behind < -BETTER).then_some(row));
     }
     rows.retain(|row| row.share > LISTED);

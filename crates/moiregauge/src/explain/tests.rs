@@ -391,6 +391,7 @@ fn the_table_knows_two_lattices_that_beat() {
         let share = 1.5 * 1.25 / (1.5 * 1.25 + 0.09);
         assert!((rows[1].share - share).abs() < 0.02, "{}", rows[1].share);
         assert!(rows[1].behind < -BETTER && (rows[1].pair - pair()).amax() < 0.003);
+        assert!((rows[1].second.unwrap() - other).amax() < 0.003);
         let alone = |value: &dyn Fn(Vector2<f64>) -> f64| {
             let image = image(seed, 0.3, value);
             table(&image, &pair(), &[], true).unwrap().len()

@@ -16,8 +16,9 @@ use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::lattice::fit::fitted::LatticeFit;
 use crate::lattice::measure::measure_levelled;
-use crate::lattice::measured::MeasuredLattice;
-use crate::lattice::predicted::bends;
+use crate::lattice::measured::{Evidence, MeasuredLattice, wavelengths};
+use crate::lattice::predicted::{accepted, bends, with_evidence};
+use crate::lattice::several::together::{measure_several_from, take_off};
 use crate::lattice::start::Start;
 use crate::spectrum::method::Method;
 
@@ -53,12 +54,67 @@ pub(crate) fn without_waves(
     (predicts > BETTER).then_some(other)
 }
 
+/// The lattice that makes the most of an image without its background, measured together with a second one on top of it, if both predict better than
+/// the lattice `found` does.
+pub(crate) fn with_another(
+    image: &Image,
+    found: &MeasuredLattice,
+    geometry: &Geometry,
+    background: Background,
+) -> Option<MeasuredLattice> {
+    shows_more(found).then_some(())?;
+    // What was found may be a superlattice of both, and what a search of both finds first, too.
+    [Some(found), None].into_iter().find_map(|first| {
+        let both = measure_several_from(first, image, geometry, background, 2).ok()?;
+        better_of_two(&both, image, found, geometry)
+    })
+}
+
+/// The same of the two lattices `both`.
+fn better_of_two(
+    both: &[MeasuredLattice],
+    image: &Image,
+    found: &MeasuredLattice,
+    geometry: &Geometry,
+) -> Option<MeasuredLattice> {
+    let displacement = geometry.displacement();
+    let model = |lattice: &MeasuredLattice| {
+        let fit = lattice.fit.as_ref()?;
+        Some(fit.waves(image, displacement.as_ref()))
+    };
+    let models = both.iter().map(model).collect::<Option<Vec<_>>>()?;
+    let power = |model: &[f64]| model.iter().map(|v| v * v).sum::<f64>();
+    let own = usize::from(power(&models[1]) > power(&models[0]));
+    let mut rest = image.clone();
+    take_off(&mut rest, &models[1 - own]);
+    let better = better_with_waves(image, &rest, &parts(&both[own]), &parts(found))?;
+    (better > BETTER).then_some(())?;
+    let to_physical = geometry.pixel_to_nm.try_inverse()?.transpose();
+    let second = wavelengths(&(to_physical * both[1 - own].reciprocal));
+    let (mut own, _) = with_evidence(both[own].clone(), &rest, geometry);
+    own.evidence.as_mut()?.second = Some(second);
+    accepted(own, geometry).ok()
+}
+
+/// Whether the image may show more than one lattice.
+fn shows_more(found: &MeasuredLattice) -> bool {
+    let shows = |evidence: &Evidence| {
+        let part = || evidence.part_of_cell().filter(|_| disagrees(found));
+        let other = evidence.undecided().or_else(part);
+        evidence.beside.is_some() || evidence.rivals > 0 || other.is_some()
+    };
+    !found.grains.is_empty() || found.evidence.as_ref().is_some_and(shows)
+}
+
 /// Whether waves beside it may have made a lattice, or hidden one.
 fn is_doubtful(image: &Image, found: &MeasuredLattice) -> bool {
     let is_strong =
         || wave_beside(image, &found.reciprocal, bends(found)).is_some_and(|w| w.strength >= 1.0);
-    let disagrees = || found.fit.as_ref().is_none_or(LatticeFit::disagrees);
-    found.patch.is_some() || disagrees() || is_strong()
+    found.patch.is_some() || disagrees(found) || is_strong()
+}
+
+fn disagrees(found: &MeasuredLattice) -> bool {
+    found.fit.as_ref().is_none_or(LatticeFit::disagrees)
 }
 
 /// A lattice and the grains beside it.

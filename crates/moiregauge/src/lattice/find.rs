@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::frame::background::Background;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
-use crate::lattice::beside::without_waves;
+use crate::lattice::beside::{with_another, without_waves};
 use crate::lattice::ground::below;
 use crate::lattice::measure::{measure_clipped, measure_evened, measure_levelled};
 use crate::lattice::measured::MeasuredLattice;
@@ -82,4 +82,5 @@ pub(crate) fn measure_own(
                 .or_else(by_prediction)
                 .ok_or(error)
         })
+        .map(|found| with_another(&image, &found, geometry, background).unwrap_or(found))
 }

@@ -120,6 +120,10 @@ pub struct Evidence {
     /// The lattices that were compared: this one, then the others, those that predict most first.
     #[serde(default)]
     pub candidates: Vec<Candidate>,
+    /// Lengths of the three shortest vectors of a second lattice on top of it, nm, as of [`Candidate`]: the two were measured together, and all that
+    /// is said here is of the image without it.
+    #[serde(with = "exact", default)]
+    pub second: Option<[f64; 3]>,
     /// The wave that the lattice does not explain and that predicts best, if it is not chance.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub beside: Option<WaveBeside>,
@@ -132,6 +136,9 @@ pub struct Candidate {
     /// Lengths of its three shortest vectors before drift and calibration are taken off, nm, shortest first.
     #[serde(with = "exact")]
     pub wavelengths: [f64; 3],
+    /// The same of a second lattice on top of it, where the two are described together: share and comparison are those of both.
+    #[serde(with = "exact", default)]
+    pub second: Option<[f64; 3]>,
     /// How many of its cells the lattice that was measured has in one: 3 and 4 where it is made of harmonics of that.
     pub cells: usize,
     /// Share of the variance of held-out blocks, without slow background, that it predicts.
@@ -167,16 +174,21 @@ impl Evidence {
     }
 }
 
+/// Lengths of the three shortest vectors, nm, shortest first, of a lattice with this reciprocal pair (rad per nm, at 60°).
+pub(crate) fn wavelengths(pair: &Matrix2<f64>) -> [f64; 3] {
+    // Each vector is across a wave: L = 2π |K| / |K₁ × K₂|.
+    let per_wave = std::f64::consts::TAU / pair.determinant().abs();
+    let mut wavelengths = three(pair).map(|wave| per_wave * wave.norm());
+    wavelengths.sort_by(f64::total_cmp);
+    wavelengths
+}
+
 impl Candidate {
     /// `to_physical`: wave vectors (rad per pixel) to rad per nm.
     pub(crate) fn new(row: &Row, to_physical: &Matrix2<f64>) -> Self {
-        let pair = to_physical * row.pair;
-        // Each vector is across a wave: L = 2π |K| / |K₁ × K₂|.
-        let per_wave = std::f64::consts::TAU / pair.determinant().abs();
-        let mut wavelengths = three(&pair).map(|wave| per_wave * wave.norm());
-        wavelengths.sort_by(f64::total_cmp);
         Self {
-            wavelengths,
+            wavelengths: wavelengths(&(to_physical * row.pair)),
+            second: row.second.map(|pair| wavelengths(&(to_physical * pair))),
             cells: row.cells,
             share: row.share,
             behind: row.behind,

@@ -130,7 +130,8 @@ pub(crate) fn with_evidence(
     let rows = table(part, &found.reciprocal, &proposals, bends).unwrap_or_default();
     let is_better = |row: &&Row| {
         let weakest = || weakest(part, &row.pair, bends);
-        row.cells == 1 && row.behind < -BETTER && weakest().is_some_and(|least| least > BETTER)
+        let is_other = row.cells == 1 && row.second.is_none() && row.behind < -BETTER;
+        is_other && weakest().is_some_and(|least| least > BETTER)
     };
     let better = rows.iter().find(is_better).map(|row| row.pair);
     let candidates = rows.iter().map(|row| Candidate::new(row, &to_physical));
@@ -141,6 +142,7 @@ pub(crate) fn with_evidence(
         share: gain(part, &larger.pair, bends).unwrap_or(0.0),
         cells: 1,
         pair: larger.pair,
+        second: None,
         behind: -larger.predicts,
     });
     let doubtful = doubtful.map(|row| Candidate::new(&row, &to_physical));
@@ -156,6 +158,7 @@ pub(crate) fn with_evidence(
         rivals,
         larger: found.larger.map(|l| l.map_or(0.0, |l| l.predicts)),
         candidates: candidates.chain(doubtful).collect(),
+        second: None,
         beside: wave_beside(part, &found.reciprocal, bends),
     });
     (found, better)

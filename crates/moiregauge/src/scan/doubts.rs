@@ -111,6 +111,9 @@ pub(crate) fn about_coverage(
         let part = evidence.part_of_cell().filter(|_| disagrees);
         let beside = evidence.beside.as_ref();
         let doubts = [
+            evidence
+                .second
+                .map(|second| LatticeDoubt::TwoLattices { second }),
             beside.and_then(|wave| second_lattice(wave, geometry)),
             other.map(|[whole, other]| LatticeDoubt::OtherLattice { whole, other }),
             part.map(|[whole, part]| LatticeDoubt::PartOfCell { whole, part }),

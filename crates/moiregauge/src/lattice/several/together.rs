@@ -43,6 +43,17 @@ pub fn measure_several(
     background: Background,
     count: usize,
 ) -> Result<Vec<MeasuredLattice>, LatticeError> {
+    measure_several_from(None, image, geometry, background, count)
+}
+
+/// The same with the first of them.
+pub(crate) fn measure_several_from(
+    first: Option<&MeasuredLattice>,
+    image: &Image,
+    geometry: &Geometry,
+    background: Background,
+    count: usize,
+) -> Result<Vec<MeasuredLattice>, LatticeError> {
     let displacement = geometry.displacement();
     let scene = Scene {
         image,
@@ -50,7 +61,8 @@ pub fn measure_several(
         background,
         displacement: displacement.as_ref(),
     };
-    let mut parts: Vec<Part> = Vec::new();
+    let first = first.and_then(|first| scene.part(first.clone()));
+    let mut parts: Vec<Part> = first.into_iter().collect();
     while parts.len() < count {
         match scene.next(&parts) {
             Ok(part) => parts.push(part),
@@ -59,7 +71,9 @@ pub fn measure_several(
         }
         scene.take_turns(&mut parts)?;
     }
-    let own = |i: usize| !parts[..i].iter().any(|other| parts[i].is(other, image));
+    // A superlattice is one lattice, whichever of its cells was found first.
+    let one = |i: &Part, j: &Part| i.is(j, image) || j.from_points_of(i, image).1 < SAME;
+    let own = |i: usize| !parts[..i].iter().any(|other| one(&parts[i], other));
     let found = (0..parts.len())
         .filter(|&i| parts[i].is_significant() && own(i))
         .count();
@@ -94,22 +108,26 @@ impl Part {
     /// harmonics of the other does, and as a lattice does whose first harmonics lie so near to those of the other that
     /// they are taken for them.
     fn is(&self, other: &Self, image: &Image) -> bool {
-        let frame = Vector2::new(image.columns as f64, image.rows as f64) / std::f64::consts::TAU;
-        let pair = &self.fit.wave_vectors.basis;
-        let theirs = &other.fit.wave_vectors.basis;
-        theirs.try_inverse().is_some_and(|inverse| {
-            let whole = (inverse * pair).map(f64::round);
-            let miss = pair - theirs * whole;
-            let cycles = Matrix2::from_diagonal(&frame) * miss;
-            let apart = cycles.column(0).norm().max(cycles.column(1).norm());
-            let points = Matrix2::from_diagonal(&frame) * theirs;
-            let spacing = points.column(0).norm().min(points.column(1).norm());
-            let near = if whole.determinant().abs() >= HIDDEN - 0.5 {
-                NEAR_HIDDEN[0].min(NEAR_HIDDEN[1] * spacing).max(SAME)
-            } else {
-                SAME
-            };
-            apart < near
+        let (cells, apart) = self.from_points_of(other, image);
+        let near = if cells >= HIDDEN - 0.5 {
+            let points = cycles(image, &other.fit.wave_vectors.basis);
+            let spacing = points[0].min(points[1]);
+            NEAR_HIDDEN[0].min(NEAR_HIDDEN[1] * spacing).max(SAME)
+        } else {
+            SAME
+        };
+        apart < near
+    }
+
+    /// How far its pair is at most from points of another lattice, cycles per frame, and before that how many of its cells are one of that other.
+    fn from_points_of(&self, other: &Self, image: &Image) -> (f64, f64) {
+        let [pair, theirs] = [self, other].map(|part| part.fit.wave_vectors.basis);
+        let whole = theirs
+            .try_inverse()
+            .map(|inverse| (inverse * pair).map(f64::round));
+        whole.map_or((0.0, f64::INFINITY), |whole| {
+            let [a, b] = cycles(image, &(pair - theirs * whole));
+            (whole.determinant().abs(), a.max(b))
         })
     }
 }
@@ -247,6 +265,12 @@ impl Scene<'_> {
         }
         Err(LatticeError::Entangled)
     }
+}
+
+/// Lengths of two wave vectors (rad per pixel), cycles per frame.
+fn cycles(image: &Image, pair: &Matrix2<f64>) -> [f64; 2] {
+    let frame = Vector2::new(image.columns as f64, image.rows as f64) / std::f64::consts::TAU;
+    [0, 1].map(|i| pair.column(i).component_mul(&frame).norm())
 }
 
 /// What the first waves of a lattice make of an image.
