@@ -114,7 +114,7 @@ pub struct LineResult {
     pub predicted_by: Option<f64>,
     /// How many waves of about the same period beside the lattice are as strong as its weakest one; three could make another lattice.
     pub rivals: Option<usize>,
-    /// Of a second lattice on top of it, which was measured with it: lengths of its three shortest vectors as those of `candidates`, which are of the image without it.
+    /// Of a second lattice on top of it, which was measured with it: lengths of its three shortest vectors as those of `candidates`.
     #[serde(default)]
     pub second_wavelengths_nm: Option<[Option<f64>; 3]>,
     /// The lattices that were compared: the one that was measured, then the others, those that predict most first.

@@ -16,8 +16,8 @@ use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::lattice::fit::fitted::LatticeFit;
 use crate::lattice::measure::measure_levelled;
-use crate::lattice::measured::{Evidence, MeasuredLattice, wavelengths};
-use crate::lattice::predicted::{accepted, bends, with_evidence};
+use crate::lattice::measured::{Evidence, MeasuredLattice};
+use crate::lattice::predicted::{bends, with_evidence_beside};
 use crate::lattice::several::together::{measure_several_from, take_off};
 use crate::lattice::start::Start;
 use crate::spectrum::method::Method;
@@ -89,11 +89,8 @@ fn better_of_two(
     take_off(&mut rest, &models[1 - own]);
     let better = better_with_waves(image, &rest, &parts(&both[own]), &parts(found))?;
     (better > BETTER).then_some(())?;
-    let to_physical = geometry.pixel_to_nm.try_inverse()?.transpose();
-    let second = wavelengths(&(to_physical * both[1 - own].reciprocal));
-    let (mut own, _) = with_evidence(both[own].clone(), &rest, geometry);
-    own.evidence.as_mut()?.second = Some(second);
-    accepted(own, geometry).ok()
+    let second = &both[1 - own].reciprocal;
+    with_evidence_beside(both[own].clone(), second, [image, &rest], geometry)
 }
 
 /// Whether the image may show more than one lattice.

@@ -120,8 +120,8 @@ pub struct Evidence {
     /// The lattices that were compared: this one, then the others, those that predict most first.
     #[serde(default)]
     pub candidates: Vec<Candidate>,
-    /// Lengths of the three shortest vectors of a second lattice on top of it, nm, as of [`Candidate`]: the two were measured together, and all that
-    /// is said here is of the image without it.
+    /// Lengths of the three shortest vectors of a second lattice on top of it, nm, as of [`Candidate`]: the two were measured together, and the other
+    /// numbers but for `candidates` are those of the image without it.
     #[serde(with = "exact", default)]
     pub second: Option<[f64; 3]>,
     /// The wave that the lattice does not explain and that predicts best, if it is not chance.
@@ -168,6 +168,8 @@ impl Evidence {
 
     /// The lattice that was measured, and the first other one of which something is true.
     fn with(&self, is_it: impl Fn(&Candidate, &Candidate) -> bool) -> Option<[Candidate; 2]> {
+        // Both of two lattices were measured.
+        self.second.is_none().then_some(())?;
         let (whole, others) = self.candidates.split_first()?;
         let other = others.iter().find(|other| is_it(whole, other))?;
         Some([*whole, *other])

@@ -11,7 +11,7 @@ use crate::frame::background::Background;
 use crate::frame::geometry::Geometry;
 use crate::frame::image::Image;
 use crate::lattice::fit::fitted::LatticeFit;
-use crate::lattice::measured::{Candidate, Evidence, MeasuredLattice};
+use crate::lattice::measured::{Candidate, Evidence, MeasuredLattice, wavelengths};
 use crate::lattice::start::{Start, measure_pair};
 use crate::spectrum::error::{LatticeError, SECOND};
 use crate::spectrum::method::Method;
@@ -114,20 +114,8 @@ pub(crate) fn with_evidence(
     };
     let part = found.patch.as_ref().map(|patch| patch.of(image));
     let part = part.as_ref().unwrap_or(image);
-    let (binning, bins) = binned(part, &found.reciprocal);
-    let (binning, spectrum) = (binning as f64, Spectrum::new(&bins));
     let bends = bends(&found);
-    let own = found.reciprocal * binning;
-    let proposals = candidates_beside(&own, &spectrum, &(geometry.pixel_to_nm * binning));
-    let proposals: Vec<Matrix2<f64>> = proposals.iter().map(|c| c.pair / binning).collect();
-    // A cell of many atoms has many strong harmonics, and peaks of its own period are no rivals.
-    let rivals = if is_made_by_many(&found) {
-        0
-    } else {
-        Rivals::new(&spectrum).of(&own, &to_physical, usize::MAX)
-    };
-    drop((spectrum, bins));
-    let rows = table(part, &found.reciprocal, &proposals, bends).unwrap_or_default();
+    let (rows, rivals) = compared(&found, part, geometry, &to_physical);
     let is_better = |row: &&Row| {
         let weakest = || weakest(part, &row.pair, bends);
         let is_other = row.cells == 1 && row.second.is_none() && row.behind < -BETTER;
@@ -162,6 +150,48 @@ pub(crate) fn with_evidence(
         beside: wave_beside(part, &found.reciprocal, bends),
     });
     (found, better)
+}
+
+/// The lattices that an image shows in place of the one that was found, and how many rival waves there are. `to_physical`: wave vectors (rad per pixel) to
+/// rad per nm.
+fn compared(
+    found: &MeasuredLattice,
+    image: &Image,
+    geometry: &Geometry,
+    to_physical: &Matrix2<f64>,
+) -> (Vec<Row>, usize) {
+    let (binning, bins) = binned(image, &found.reciprocal);
+    let (binning, spectrum) = (binning as f64, Spectrum::new(&bins));
+    let own = found.reciprocal * binning;
+    let proposals = candidates_beside(&own, &spectrum, &(geometry.pixel_to_nm * binning));
+    let proposals: Vec<Matrix2<f64>> = proposals.iter().map(|c| c.pair / binning).collect();
+    // A cell of many atoms has many strong harmonics, and peaks of its own period are no rivals.
+    let rivals = if is_made_by_many(found) {
+        0
+    } else {
+        Rivals::new(&spectrum).of(&own, to_physical, usize::MAX)
+    };
+    drop((spectrum, bins));
+    let rows = table(image, &found.reciprocal, &proposals, bends(found));
+    (rows.unwrap_or_default(), rivals)
+}
+
+/// The lattice measured beside `second` (reciprocal pair, rad per pixel), with its evidence: in `rest`, the image without that one. The lattices that are
+/// compared are those of the image.
+pub(crate) fn with_evidence_beside(
+    found: MeasuredLattice,
+    second: &Matrix2<f64>,
+    [image, rest]: [&Image; 2],
+    geometry: &Geometry,
+) -> Option<MeasuredLattice> {
+    let to_physical = geometry.pixel_to_nm.try_inverse()?.transpose();
+    let (mut found, _) = with_evidence(found, rest, geometry);
+    let (rows, _) = compared(&found, image, geometry, &to_physical);
+    let evidence = found.evidence.as_mut()?;
+    let candidates = rows.iter().map(|row| Candidate::new(row, &to_physical));
+    evidence.candidates = candidates.collect();
+    evidence.second = Some(wavelengths(&(to_physical * second)));
+    accepted(found, geometry).ok()
 }
 
 /// The lattice, if its evidence does not refute it, with the grains beside it that pass the same tests.

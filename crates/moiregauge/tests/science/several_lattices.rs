@@ -1,9 +1,10 @@
 //! Several lattices in one image are separated, each within its errors.
 
-use crate::fit_scene::{Contrast, Scene};
+use crate::fit_scene::{Contrast, Scene, Wave};
+use heterostrain::lattice::reciprocal;
 use moiregauge::frame::Background;
-use moiregauge::lattice::{MeasuredLattice, measure_several};
-use moiregauge::spectrum::LatticeError;
+use moiregauge::lattice::{MeasuredLattice, measure, measure_several};
+use moiregauge::spectrum::{LatticeError, Method};
 use nalgebra::{Matrix2, Vector4};
 
 /// Size and turn a lattice.
@@ -153,5 +154,85 @@ fn nearly_commensurate_lattices_are_measured_or_refused() {
             }
             Err(error) => assert!(!resolved, "{ratio:.3}: {error}"),
         }
+    }
+}
+
+/// The image of two lattices asked for one: it is the stronger one, within its errors, measured together with the other, which is named. Eight periods
+/// and 0.8, 1.2 and 1.5 times as many at half the amplitude.
+#[test]
+fn the_stronger_of_two_lattices_is_measured_beside_the_other() {
+    let (mut squares, mut n) = (0.0, 0.0);
+    for (seed, (ratio, turn)) in [(0.8, 0.1), (1.2, 0.2), (1.5, 0.7)]
+        .into_iter()
+        .cycle()
+        .take(12)
+        .enumerate()
+    {
+        let (seed, angle) = (seed as u64, 0.618_034 * seed as f64);
+        let first = scene(160, 8.0, angle, Contrast::Cosines, seed);
+        let mut second = scene(160, 8.0, angle, Contrast::Cosines, seed + 100);
+        changed(&mut second, 1.0 / ratio, turn);
+        for wave in &mut second.waves {
+            wave.amplitude *= 0.5;
+        }
+        let all = together(&[first.clone(), second.clone()]);
+        let (geometry, method) = (all.geometry(), Method::Lattice);
+        let found = measure(&all.image(), &geometry, Background::Plane, method).unwrap();
+        let named = found.evidence.as_ref().and_then(|evidence| evidence.second);
+        let named = named.unwrap_or_else(|| panic!("{seed}: no second lattice"));
+        let wanted = second.wavelengths();
+        let off = named.iter().zip(wanted).map(|(a, b)| (a / b - 1.0).abs());
+        assert!(
+            off.fold(0.0, f64::max) < 0.02,
+            "{seed}: {named:?} {wanted:?}"
+        );
+        let pull = pulls(&first, &[found]);
+        assert!(pull.amax() < 4.0, "{seed}: {pull:?}");
+        squares += pull.norm_squared();
+        n += 4.0;
+    }
+    let (mean, scatter) = (squares / n, 3.0 * f64::sqrt(2.0 / n));
+    assert!((mean - 1.0).abs() < scatter, "{mean} ± {scatter}");
+}
+
+/// A lattice and another of √3 or 2 times the period whose harmonics it is are one lattice: that of the larger cell.
+#[test]
+fn a_superlattice_is_one_lattice() {
+    // The fine reciprocal pair from the coarse one.
+    for (name, fine_from_coarse) in [
+        ("√3", Matrix2::new(1.0, -1.0, 1.0, 2.0)),
+        ("2", Matrix2::identity() * 2.0),
+    ] {
+        let fine = scene(192, 14.0, 0.3, Contrast::Cosines, 1);
+        let mut coarse = fine.clone();
+        let pair = Matrix2::from_columns(&[fine.waves[1].q, fine.waves[2].q]);
+        let pair = pair * fine_from_coarse.try_inverse().unwrap();
+        let [a, b] = [0, 1].map(|i| pair.column(i).into_owned());
+        for (wave, q) in coarse.waves.iter_mut().zip([a, b, b - a]) {
+            *wave = Wave {
+                q,
+                amplitude: 0.15 * wave.amplitude,
+                ..*wave
+            };
+        }
+        coarse.basis = reciprocal(&pair).unwrap();
+        let scenes = [fine, coarse.clone()];
+        let one = LatticeError::FewerLattices {
+            found: 1,
+            wanted: 2,
+        };
+        assert_eq!(separate(&scenes).err(), Some(one), "{name}");
+        let all = together(&scenes);
+        let found = measure(
+            &all.image(),
+            &all.geometry(),
+            Background::Plane,
+            Method::Lattice,
+        )
+        .unwrap();
+        let second = found.evidence.as_ref().unwrap().second;
+        assert_eq!(second, None, "{name}");
+        let cells = found.pixels.basis.determinant() / coarse.basis.determinant();
+        assert!((cells.abs() - 1.0).abs() < 0.01, "{name}: {cells}");
     }
 }
