@@ -329,6 +329,10 @@ class CandidateResult(Document):
     """Share of the variance of parts of the frame that were held out, without slow background, that it
     predicts.
     """
+    second_wavelengths_nm: tuple[float | None, float | None, float | None] | None
+    """The same of a second lattice on top of it, where the two are described together: share and comparison
+    are those of both.
+    """
     wavelengths_nm: tuple[float | None, float | None, float | None]
     """Lengths of its three shortest vectors by the geometry of the scan, drift included, shortest first."""
 
@@ -790,6 +794,10 @@ class LineResult(Document):
     rivals: int | None
     """How many waves of about the same period beside the lattice are as strong as its weakest one; three
     could make another lattice.
+    """
+    second_wavelengths_nm: tuple[float | None, float | None, float | None] | None
+    """Of a second lattice on top of it, which was measured with it: lengths of its three shortest vectors as
+    those of `candidates`.
     """
     share_covered: float | None
     """Share of the frame that carries the lattice and was measured."""
@@ -2022,6 +2030,7 @@ decoded_by(
         CandidateResult: {
             "behind_by": float,
             "predicted_share": float,
+            "second_wavelengths_nm": several(float, 3),
             "wavelengths_nm": several(float, 3),
         },
         Caveat: {
@@ -2161,6 +2170,7 @@ decoded_by(
             "periods": float,
             "pixel_to_nm": several(several(float, 2), 2),
             "predicted_by": float,
+            "second_wavelengths_nm": several(float, 3),
             "share_covered": float,
             "shortcut_wavelengths_nm": several(float, 3),
             "signal_to_noise": float,
