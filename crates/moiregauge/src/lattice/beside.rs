@@ -100,7 +100,8 @@ fn shows_more(found: &MeasuredLattice) -> bool {
         let other = evidence.undecided().or_else(part);
         evidence.beside.is_some() || evidence.rivals > 0 || other.is_some()
     };
-    !found.grains.is_empty() || found.evidence.as_ref().is_some_and(shows)
+    // Grains leave out what is between them, which two lattices everywhere do not.
+    found.grains.is_empty() && found.evidence.as_ref().is_some_and(shows)
 }
 
 /// Whether waves beside it may have made a lattice, or hidden one.
