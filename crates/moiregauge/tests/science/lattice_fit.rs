@@ -319,7 +319,7 @@ fn a_second_lattice_stands_out() {
     assert!(scene.error(&measured.pixels.basis).norm() < 0.01 * scene.basis.norm());
     assert_eq!(beside(&measured), None);
     let second = measured.evidence.unwrap().second.unwrap();
-    let wanted = other.wavelengths();
+    let wanted = crate::several_lattices::wavelengths(&other);
     let off = second.iter().zip(wanted).map(|(a, b)| (a / b - 1.0).abs());
     assert!(off.fold(0.0, f64::max) < 0.01, "{second:?} {wanted:?}");
 }

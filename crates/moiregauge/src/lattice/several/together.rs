@@ -72,7 +72,7 @@ pub(crate) fn measure_several_from(
         scene.take_turns(&mut parts)?;
     }
     // A superlattice is one lattice, whichever of its cells was found first.
-    let one = |i: &Part, j: &Part| i.is(j, image) || j.from_points_of(i, image).1 < SAME;
+    let one = |i: &Part, j: &Part| i.is(j, image) || j.to_points_of(i, image).1 < SAME;
     let own = |i: usize| !parts[..i].iter().any(|other| one(&parts[i], other));
     let found = (0..parts.len())
         .filter(|&i| parts[i].is_significant() && own(i))
@@ -108,7 +108,7 @@ impl Part {
     /// harmonics of the other does, and as a lattice does whose first harmonics lie so near to those of the other that
     /// they are taken for them.
     fn is(&self, other: &Self, image: &Image) -> bool {
-        let (cells, apart) = self.from_points_of(other, image);
+        let (cells, apart) = self.to_points_of(other, image);
         let near = if cells >= HIDDEN - 0.5 {
             let points = cycles(image, &other.fit.wave_vectors.basis);
             let spacing = points[0].min(points[1]);
@@ -119,8 +119,8 @@ impl Part {
         apart < near
     }
 
-    /// How far its pair is at most from points of another lattice, cycles per frame, and before that how many of its cells are one of that other.
-    fn from_points_of(&self, other: &Self, image: &Image) -> (f64, f64) {
+    /// How many cells of its own size are one of another lattice, and how far its pair is from points of that one at most, cycles per frame.
+    fn to_points_of(&self, other: &Self, image: &Image) -> (f64, f64) {
         let [pair, theirs] = [self, other].map(|part| part.fit.wave_vectors.basis);
         let whole = theirs
             .try_inverse()

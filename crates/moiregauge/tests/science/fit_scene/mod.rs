@@ -257,14 +257,6 @@ impl Scene {
         pulls
     }
 
-    /// Lengths of the three shortest vectors, shortest first.
-    pub(crate) fn wavelengths(&self) -> [f64; 3] {
-        let [a, b] = [0, 1].map(|i| self.basis.column(i).into_owned());
-        let mut lengths = [a.norm(), b.norm(), (b - a).norm()];
-        lengths.sort_by(f64::total_cmp);
-        lengths
-    }
-
     /// Errors of the four components in the labelling closest to the truth.
     pub(crate) fn error(&self, measured: &Matrix2<f64>) -> Vector4<f64> {
         let (change, _) = self.change(measured);
