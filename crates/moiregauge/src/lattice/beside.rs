@@ -63,11 +63,14 @@ pub(crate) fn with_another(
     background: Background,
 ) -> Option<MeasuredLattice> {
     shows_more(found).then_some(())?;
-    // What was found may be a superlattice of both, and what a search of both finds first, too.
-    [Some(found), None].into_iter().find_map(|first| {
+    let beside = |first| {
         let both = measure_several_from(first, image, geometry, background, 2).ok()?;
         better_of_two(&both, image, found, geometry)
-    })
+    };
+    // What was found may be a superlattice of both.
+    let evidence = found.evidence.as_ref();
+    let is_part = || evidence.and_then(Evidence::part_of_cell).is_some();
+    beside(Some(found)).or_else(|| is_part().then(|| beside(None))?)
 }
 
 /// The same of the two lattices `both`.
