@@ -152,6 +152,8 @@ pub struct Candidate {
 impl Evidence {
     /// The lattice that was measured, and another one, no part of its cell, that predicts at least half as much and is less than four standard errors behind.
     pub(crate) fn undecided(&self) -> Option<[Candidate; 2]> {
+        // The other one may be the second lattice, which was measured too.
+        self.second.is_none().then_some(())?;
         let as_well = |whole: &Candidate, other: &Candidate| {
             other.cells == 1 && other.behind < BETTER && other.share > MOST * whole.share
         };
@@ -168,8 +170,6 @@ impl Evidence {
 
     /// The lattice that was measured, and the first other one of which something is true.
     fn with(&self, is_it: impl Fn(&Candidate, &Candidate) -> bool) -> Option<[Candidate; 2]> {
-        // Both of two lattices were measured.
-        self.second.is_none().then_some(())?;
         let (whole, others) = self.candidates.split_first()?;
         let other = others.iter().find(|other| is_it(whole, other))?;
         Some([*whole, *other])
@@ -195,5 +195,37 @@ impl Candidate {
             share: row.share,
             behind: row.behind,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A second lattice that was measured is no rival, and says nothing of a lattice that may be that of a part of the cell.
+    #[test]
+    fn a_second_lattice_hides_no_part_of_the_cell() {
+        let candidate = |cells, share, behind| Candidate {
+            wavelengths: [10.0; 3],
+            second: None,
+            cells,
+            share,
+            behind,
+        };
+        let mut evidence = Evidence {
+            predicts: None,
+            rivals: 0,
+            larger: [0.0; 3],
+            second: None,
+            candidates: vec![
+                candidate(1, 0.9, 0.0),
+                candidate(1, 0.8, 1.0),
+                candidate(3, 0.7, 9.0),
+            ],
+            beside: None,
+        };
+        assert!(evidence.undecided().is_some() && evidence.part_of_cell().is_some());
+        evidence.second = Some([9.0; 3]);
+        assert!(evidence.undecided().is_none() && evidence.part_of_cell().is_some());
     }
 }
