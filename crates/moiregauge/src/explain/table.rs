@@ -84,12 +84,9 @@ pub(crate) fn table(
     let mut rows = Vec::new();
     // The second shell is the first of a third of the cell, the third that of a fourth.
     for (shell, cells) in [(2, 3), (3, 4)] {
-        let own = shells(shell - 1).len()..shells(shell).len();
-        let wave = |[h, k]: [i32; 2]| first * Vector2::new(f64::from(h), f64::from(k));
-        let pair = [wave(indices[own.start]), wave(indices[own.start + 1])];
-        let kept: Vec<usize> = (2 * own.start..2 * own.end).collect();
+        let kept: Vec<usize> = (2 * shells(shell - 1).len()..2 * shells(shell).len()).collect();
         let gain = gains(&answer, &kept)?;
-        rows.push(row(Matrix2::from_columns(&pair), &gain, cells));
+        rows.push(row(of_shell(first, shell), &gain, cells));
     }
     for proposal in proposals() {
         let is_known = |pair: &Matrix2<f64>| {
@@ -127,6 +124,13 @@ pub(crate) fn table(
     };
     rows.insert(0, answer);
     Some(rows)
+}
+
+/// Two waves of a shell, 60° apart: the reciprocal pair of a part of the cell.
+pub(crate) fn of_shell(pair: &Matrix2<f64>, shell: usize) -> Matrix2<f64> {
+    let first = shells(shell - 1).len();
+    let wave = |[h, k]: [i32; 2]| pair * Vector2::new(f64::from(h), f64::from(k));
+    Matrix2::from_columns(&[first, first + 1].map(|i| wave(shells(shell)[i])))
 }
 
 /// Two straight lattices on top of each other that look like one (reciprocal pair at 60°, rad per bin), since their waves beat: the stronger one, and the

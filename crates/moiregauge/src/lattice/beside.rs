@@ -10,6 +10,7 @@ use nalgebra::Matrix2;
 use crate::coverage::find::cells;
 use crate::explain::beside::wave_beside;
 use crate::explain::evidence::BETTER;
+use crate::explain::table::of_shell;
 use crate::explain::waves::{Part, WithWaves, better_with_waves};
 use crate::frame::background::Background;
 use crate::frame::geometry::Geometry;
@@ -19,7 +20,7 @@ use crate::lattice::measure::measure_levelled;
 use crate::lattice::measured::{Evidence, MeasuredLattice};
 use crate::lattice::predicted::{bends, with_evidence_beside};
 use crate::lattice::several::together::{measure_several_from, take_off};
-use crate::lattice::start::Start;
+use crate::lattice::start::{Start, measure_pair};
 use crate::spectrum::method::Method;
 
 /// The lattice in what an image without its background leaves without strong waves, if that predicts better than the lattice `found` without them.
@@ -63,44 +64,59 @@ pub(crate) fn with_another(
     background: Background,
 ) -> Option<MeasuredLattice> {
     shows_more(found).then_some(())?;
-    let beside = |first| {
-        let both = measure_several_from(first, image, geometry, background, 2).ok()?;
-        better_of_two(&both, image, found, geometry)
-    };
     // What was found may be a superlattice of both.
     let evidence = found.evidence.as_ref();
-    let is_part = || evidence.and_then(Evidence::part_of_cell).is_some();
-    beside(Some(found)).or_else(|| is_part().then(|| beside(None))?)
+    let part = evidence.and_then(Evidence::part_of_cell).map(|[_, part]| {
+        let pair = of_shell(&found.reciprocal, part.cells - 1);
+        measure_pair(&pair, None, image, geometry, background, Method::Lattice)
+    });
+    let anew = part.is_some().then_some(None);
+    let starts = [Some(Some(found.clone())), part, anew];
+    let both = starts.into_iter().flatten().filter_map(|first| {
+        let first = first.as_ref();
+        let both = measure_several_from(first, image, geometry, background, 2).ok()?;
+        better_of_two(&both, image, found, geometry)
+    });
+    let (_, best) = both.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(best)
 }
 
-/// The same of the two lattices `both`.
+/// The same of the two lattices `both`, and the power that they leave.
 fn better_of_two(
     both: &[MeasuredLattice],
     image: &Image,
     found: &MeasuredLattice,
     geometry: &Geometry,
-) -> Option<MeasuredLattice> {
+) -> Option<(f64, MeasuredLattice)> {
     let displacement = geometry.displacement();
     let model = |lattice: &MeasuredLattice| {
         let fit = lattice.fit.as_ref()?;
         Some(fit.waves(image, displacement.as_ref()))
     };
     let models = both.iter().map(model).collect::<Option<Vec<_>>>()?;
-    let power = |model: &[f64]| model.iter().map(|v| v * v).sum::<f64>();
-    let own = usize::from(power(&models[1]) > power(&models[0]));
+    // Higher orders of one may lie where the other has its first.
+    let power = |lattice: &MeasuredLattice| {
+        let first = lattice.fit.iter().flat_map(|fit| &fit.harmonics[..3]);
+        first
+            .map(|harmonic| harmonic.amplitude.powi(2))
+            .sum::<f64>()
+    };
+    let own = usize::from(power(&both[1]) > power(&both[0]));
     let mut rest = image.clone();
     take_off(&mut rest, &models[1 - own]);
     let better = better_with_waves(image, &rest, &parts(&both[own]), &parts(found))?;
     (better > BETTER).then_some(())?;
     let second = &both[1 - own].reciprocal;
-    with_evidence_beside(both[own].clone(), second, [image, &rest], geometry)
+    let answer = with_evidence_beside(both[own].clone(), second, [image, &rest], geometry)?;
+    take_off(&mut rest, &models[own]);
+    let there = rest.values.iter().filter(|value| value.is_finite());
+    Some((there.map(|value| value * value).sum(), answer))
 }
 
 /// Whether the image may show more than one lattice.
 fn shows_more(found: &MeasuredLattice) -> bool {
     let shows = |evidence: &Evidence| {
-        let part = || evidence.part_of_cell().filter(|_| disagrees(found));
-        let other = evidence.undecided().or_else(part);
+        let other = evidence.undecided().or_else(|| evidence.part_of_cell());
         evidence.beside.is_some() || evidence.rivals > 0 || other.is_some()
     };
     // Grains leave out what is between them, which two lattices everywhere do not.

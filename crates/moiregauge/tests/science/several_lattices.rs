@@ -203,44 +203,64 @@ fn the_stronger_of_two_lattices_is_measured_beside_the_other() {
     assert!((mean - 1.0).abs() < scatter, "{mean} ± {scatter}");
 }
 
+/// A lattice and another one whose waves are `amplitude` times as strong, and whose wave vectors are `length` times as long as those of a superlattice.
+fn with_superlattice(from_coarse: Matrix2<f64>, amplitude: f64, length: f64) -> [Scene; 2] {
+    let fine = scene(192, 14.0, 0.3, Contrast::Cosines, 1);
+    let mut coarse = fine.clone();
+    let pair = Matrix2::from_columns(&[fine.waves[1].q, fine.waves[2].q]);
+    let pair = pair * from_coarse.try_inverse().unwrap() * length;
+    let [a, b] = [0, 1].map(|i| pair.column(i).into_owned());
+    for (wave, q) in coarse.waves.iter_mut().zip([a, b, b - a]) {
+        *wave = Wave {
+            q,
+            amplitude: amplitude * wave.amplitude,
+            ..*wave
+        };
+    }
+    coarse.basis = reciprocal(&pair).unwrap();
+    [fine, coarse]
+}
+
+/// The cell of √3 times the period, by its reciprocal pair.
+fn root_three() -> Matrix2<f64> {
+    Matrix2::new(1.0, -1.0, 1.0, 2.0)
+}
+
+fn measured(scenes: &[Scene]) -> MeasuredLattice {
+    let all = together(scenes);
+    let (background, method) = (Background::Plane, Method::Lattice);
+    measure(&all.image(), &all.geometry(), background, method).unwrap()
+}
+
 /// A lattice and another of √3 or 2 times the period whose harmonics it is are one lattice: that of the larger cell.
 #[test]
 fn a_superlattice_is_one_lattice() {
-    // The fine reciprocal pair from the coarse one.
-    for (name, fine_from_coarse) in [
-        ("√3", Matrix2::new(1.0, -1.0, 1.0, 2.0)),
-        ("2", Matrix2::identity() * 2.0),
-    ] {
-        let fine = scene(192, 14.0, 0.3, Contrast::Cosines, 1);
-        let mut coarse = fine.clone();
-        let pair = Matrix2::from_columns(&[fine.waves[1].q, fine.waves[2].q]);
-        let pair = pair * fine_from_coarse.try_inverse().unwrap();
-        let [a, b] = [0, 1].map(|i| pair.column(i).into_owned());
-        for (wave, q) in coarse.waves.iter_mut().zip([a, b, b - a]) {
-            *wave = Wave {
-                q,
-                amplitude: 0.15 * wave.amplitude,
-                ..*wave
-            };
-        }
-        coarse.basis = reciprocal(&pair).unwrap();
-        let scenes = [fine, coarse.clone()];
+    for (name, fine_from_coarse) in [("√3", root_three()), ("2", Matrix2::identity() * 2.0)] {
+        let scenes = with_superlattice(fine_from_coarse, 0.15, 1.0);
         let one = LatticeError::FewerLattices {
             found: 1,
             wanted: 2,
         };
         assert_eq!(separate(&scenes).err(), Some(one), "{name}");
-        let all = together(&scenes);
-        let found = measure(
-            &all.image(),
-            &all.geometry(),
-            Background::Plane,
-            Method::Lattice,
-        )
-        .unwrap();
+        let found = measured(&scenes);
         let second = found.evidence.as_ref().unwrap().second;
         assert_eq!(second, None, "{name}");
-        let cells = found.pixels.basis.determinant() / coarse.basis.determinant();
+        let cells = found.pixels.basis.determinant() / scenes[1].basis.determinant();
         assert!((cells.abs() - 1.0).abs() < 0.01, "{name}: {cells}");
+    }
+}
+
+/// Waves that miss those of a superlattice by 1.2 %, or 0.2 cycles of the frame, are those of a second lattice, not of a larger cell.
+#[test]
+fn a_second_lattice_close_to_a_superlattice_is_told_from_it() {
+    let mut scenes = with_superlattice(root_three(), 0.6, 1.012);
+    scenes[0].white = 0.2;
+    let found = measured(&scenes);
+    let cells = found.pixels.basis.determinant() / scenes[0].basis.determinant();
+    assert!((cells.abs() - 1.0).abs() < 0.001, "{cells}");
+    let second = found.evidence.unwrap().second.unwrap();
+    for (length, truth) in second.into_iter().zip(wavelengths(&scenes[1])) {
+        let off = length / truth - 1.0;
+        assert!(off.abs() < 0.003, "{off}");
     }
 }

@@ -1,6 +1,6 @@
 //! Lattices that take turns.
 
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{Matrix2, Vector2, Vector4};
 
 use crate::explain::split::{Guess, split};
 use crate::frame::background::{Background, remove_background};
@@ -18,6 +18,8 @@ use crate::spectrum::method::Method;
 
 /// Nothing moves any more: changes below this part of σ. Any small number: each round costs time.
 const STILL: f64 = 0.03;
+/// Largest part of what is left after a round that the next one may leave: turns that leave more do not settle.
+const MOST_LEFT: f64 = 0.8;
 /// Signal over noise of the weakest first harmonic of a lattice, at least, when all are taken off: 25 in power, a
 /// little more than the 20 of the search.
 const WEAKEST: f64 = 5.0;
@@ -25,6 +27,9 @@ const WEAKEST: f64 = 5.0;
 const ON_TRIAL: f64 = 1.5;
 /// Lattices whose wave vectors lie within this of each other (cycles per frame) are one: far less than a main lobe.
 const SAME: f64 = 0.3;
+/// Wave vectors of a superlattice are off points of its lattice by fewer standard errors: at most 2 where one lattice is drawn, 11 and more where two are
+/// whose cells differ by a factor of 1.68 to 1.8.
+const NESTED: f64 = 8.0;
 /// A lattice whose first harmonics lie so near to higher ones of another (indices of a cell 3, 4 or 7 times as dense) that
 /// they are taken for these shows by its own higher ones: those of a cell that is at least this much denser ...
 const HIDDEN: f64 = 9.0;
@@ -72,7 +77,9 @@ pub(crate) fn measure_several_from(
         scene.take_turns(&mut parts)?;
     }
     // A superlattice is one lattice, whichever of its cells was found first.
-    let one = |i: &Part, j: &Part| i.is(j, image) || j.to_points_of(i, image).1 < SAME;
+    let nested =
+        |i: &Part, j: &Part| j.to_points_of(i, image).1 < SAME && j.standard_errors_off(i) < NESTED;
+    let one = |i: &Part, j: &Part| i.is(j, image) || nested(i, j);
     let own = |i: usize| !parts[..i].iter().any(|other| one(&parts[i], other));
     let found = (0..parts.len())
         .filter(|&i| parts[i].is_significant() && own(i))
@@ -117,6 +124,21 @@ impl Part {
             SAME
         };
         apart < near
+    }
+
+    /// By how many standard errors of both its pair is off points of another lattice.
+    fn standard_errors_off(&self, other: &Self) -> f64 {
+        let [own, theirs] = [self, other].map(|part| &part.fit.wave_vectors);
+        let Some(inverse) = theirs.basis.try_inverse() else {
+            return f64::INFINITY;
+        };
+        let whole = (inverse * own.basis).map(f64::round);
+        let off = own.basis - theirs.basis * whole;
+        let carry = whole.transpose().kronecker(&Matrix2::identity());
+        let covariance = own.covariance + carry * theirs.covariance * carry.transpose();
+        let off = Vector4::from_column_slice(off.as_slice());
+        let chi2 = covariance.cholesky().map(|c| off.dot(&c.solve(&off)));
+        chi2.map_or(f64::INFINITY, f64::sqrt)
     }
 
     /// How many cells of its own size are one of another lattice, and how far its pair is from points of that one at most, cycles per frame.
@@ -244,10 +266,13 @@ impl Scene<'_> {
         image
     }
 
-    /// Fits each anew to what the others leave, until none moves.
+    /// Fits each anew to what the others leave, until none moves. Lattices that share power move by about the same part of what is left each time: two
+    /// rounds tell where that ends (Aitken's Δ² process).
     fn take_turns(&self, parts: &mut [Part]) -> Result<(), LatticeError> {
+        let mut before: Option<Vec<f64>> = None;
         for round in 0..MOST_ROUNDS {
             let mut most = 0.0f64;
+            let mut change = Vec::new();
             for i in 0..parts.len() {
                 let left = self.without(parts, Some(i));
                 let pair = parts[i].fit.wave_vectors.basis;
@@ -257,15 +282,31 @@ impl Scene<'_> {
                 let sigma = part.fit.wave_vectors.covariance.diagonal().map(f64::sqrt);
                 let moved = moved.iter().zip(sigma.iter());
                 most = moved.fold(most, |most, (d, s)| most.max(d.abs() / s));
+                change.extend(
+                    part.model
+                        .iter()
+                        .zip(&parts[i].model)
+                        .map(|(new, old)| new - old),
+                );
                 parts[i] = part;
             }
             if most < STILL {
                 return Ok(());
             }
+            let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+            let Some(last) = before.take() else {
+                before = Some(change);
+                continue;
+            };
             // Lattices that can be told apart move by less than σ by then.
             if round > MOST_ROUNDS / 8 && most > 1.0 {
                 break;
             }
+            let ratio = (dot(&change, &last) / dot(&last, &last)).clamp(-1.0, MOST_LEFT);
+            let further = ratio / (1.0 - ratio);
+            let models = parts.iter_mut().flat_map(|part| &mut part.model);
+            let changed = models.zip(&change);
+            changed.for_each(|(model, change)| *model += further * change);
         }
         Err(LatticeError::Entangled)
     }
