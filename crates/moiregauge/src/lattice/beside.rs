@@ -66,13 +66,13 @@ pub(crate) fn with_another(
     shows_more(found).then_some(())?;
     // What was found may be a superlattice of both.
     let evidence = found.evidence.as_ref();
-    let part = evidence.and_then(Evidence::part_of_cell).map(|[_, part]| {
+    let mut starts = vec![Some(found.clone())];
+    if let Some([_, part]) = evidence.and_then(Evidence::part_of_cell) {
         let pair = of_shell(&found.reciprocal, part.cells - 1);
-        measure_pair(&pair, None, image, geometry, background, Method::Lattice)
-    });
-    let anew = part.is_some().then_some(None);
-    let starts = [Some(Some(found.clone())), part, anew];
-    let both = starts.into_iter().flatten().filter_map(|first| {
+        let part = measure_pair(&pair, None, image, geometry, background, Method::Lattice);
+        starts.extend([part, None]);
+    }
+    let both = starts.iter().filter_map(|first| {
         let first = first.as_ref();
         let both = measure_several_from(first, image, geometry, background, 2).ok()?;
         better_of_two(&both, image, found, geometry)
